@@ -1,0 +1,119 @@
+#include "core/base/file.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cstring>
+#include <string>
+#include <system_error>
+
+namespace lightloom {
+namespace {
+
+namespace fs = std::filesystem;
+
+absl::Status system_error(std::string_view what, const fs::path& path) {
+  const int error = errno;
+  const std::string message = std::string(what) + " " + path.string() + ": " + std::strerror(error);
+  if (error == ENOENT) return absl::NotFoundError(message);
+  if (error == EACCES || error == EROFS) return absl::PermissionDeniedError(message);
+  if (error == ENOSPC || error == EDQUOT) return absl::ResourceExhaustedError(message);
+  return absl::UnavailableError(message);
+}
+
+/// A file descriptor that closes itself.
+class Fd {
+ public:
+  explicit Fd(int fd) : fd_(fd) {}
+  ~Fd() {
+    if (fd_ >= 0) ::close(fd_);
+  }
+  Fd(const Fd&) = delete;
+  Fd& operator=(const Fd&) = delete;
+  int get() const { return fd_; }
+
+ private:
+  int fd_;
+};
+
+absl::Status sync_path(const fs::path& path, int flags) {
+  const Fd fd(::open(path.c_str(), flags | O_CLOEXEC));
+  if (fd.get() < 0) return system_error("cannot open", path);
+  if (::fsync(fd.get()) != 0) return system_error("cannot sync", path);
+  return absl::OkStatus();
+}
+
+absl::Status write_all(const fs::path& path, std::span<const uint8_t> data) {
+  const Fd fd(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644));
+  if (fd.get() < 0) return system_error("cannot create", path);
+  while (!data.empty()) {
+    const ssize_t n = ::write(fd.get(), data.data(), data.size());
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) return system_error("cannot write", path);
+    data = data.subspan(static_cast<size_t>(n));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::StatusOr<std::vector<uint8_t>> read_file(const fs::path& path) {
+  const Fd fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (fd.get() < 0) return system_error("cannot open", path);
+  struct stat info {};
+  if (::fstat(fd.get(), &info) != 0) return system_error("cannot stat", path);
+  if (!S_ISREG(info.st_mode)) return absl::InvalidArgumentError(path.string() + " is not a regular file");
+  std::vector<uint8_t> data(static_cast<size_t>(info.st_size));
+  size_t done = 0;
+  while (done < data.size()) {
+    const ssize_t n = ::read(fd.get(), data.data() + done, data.size() - done);
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) return system_error("cannot read", path);
+    if (n == 0) return absl::DataLossError(path.string() + " shrank while it was read");
+    done += static_cast<size_t>(n);
+  }
+  return data;
+}
+
+fs::path temporary_beside(const fs::path& path) {
+  static std::atomic<uint64_t> counter{0};
+  fs::path temporary = path;
+  temporary += ".tmp-" + std::to_string(::getpid()) + "-" + std::to_string(counter.fetch_add(1));
+  return temporary;
+}
+
+absl::Status commit_file(const fs::path& temporary, const fs::path& path) {
+  absl::Status status = sync_path(temporary, O_RDONLY);
+  if (status.ok() && ::rename(temporary.c_str(), path.c_str()) != 0) status = system_error("cannot write", path);
+  if (!status.ok()) {
+    ::unlink(temporary.c_str());
+    return status;
+  }
+  const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+  return sync_path(folder, O_RDONLY | O_DIRECTORY);
+}
+
+absl::Status write_file_atomic(const fs::path& path, std::span<const uint8_t> data) {
+  if (path.has_parent_path()) {
+    std::error_code error;
+    fs::create_directories(path.parent_path(), error);
+    if (error) {
+      return absl::UnavailableError("cannot create folder " + path.parent_path().string() + ": " + error.message());
+    }
+  }
+  const fs::path temporary = temporary_beside(path);
+  if (absl::Status status = write_all(temporary, data); !status.ok()) {
+    ::unlink(temporary.c_str());
+    return status;
+  }
+  return commit_file(temporary, path);
+}
+
+absl::Status write_file_atomic(const fs::path& path, std::string_view text) {
+  return write_file_atomic(path, {reinterpret_cast<const uint8_t*>(text.data()), text.size()});
+}
+
+}  // namespace lightloom

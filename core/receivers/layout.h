@@ -1,0 +1,53 @@
+// Where each object's lightmap lies in the image that users see.
+//
+// Receivers are keyed by (object, local texel); the placement of an object's texels in the output image is a separate
+// table, so that moving one object in the image rebakes nothing.
+#pragma once
+
+#include <map>
+#include <vector>
+
+#include "core/base/status.h"
+#include "core/receivers/atlas.h"
+#include "core/scene/scene.h"
+
+namespace lightloom {
+
+enum class LayoutMode : uint8_t {
+  kScene,      ///< one TEXCOORD_1 atlas shared by all objects; local texels are those of the image
+  kPerObject,  ///< a lightmap per object, packed
+};
+
+struct Placement {
+  int x = 0, y = 0;  ///< of local texel (0,0), texels of the image
+  bool operator==(const Placement&) const = default;
+};
+
+/// Per-object arrays follow Scene::objects. Objects without a lightmap (dynamic, volume, none) have uv.corners empty
+/// and size 0.
+struct AtlasLayout {
+  LayoutMode mode = LayoutMode::kScene;
+  int width = 0, height = 0;  ///< of the output image
+  std::vector<LightmapUv> uv;
+  std::vector<Placement> placements;
+};
+
+struct LayoutOptions {
+  int lightmap_size = 0;         ///< side of the scene atlas, texels; 0: from texels_per_metre
+  float texels_per_metre = 0;    ///< 0: chosen from the scene's area so that it has about 2^16 texels
+  /// Placements of an earlier layout, by object id with the size it had; objects found here with equal size keep
+  /// their place, others take free space, the image grows in height only.
+  struct Earlier {
+    Placement placement;
+    int width = 0, height = 0;
+  };
+  std::map<Digest, Earlier> earlier;
+  int earlier_width = 0, earlier_height = 0;
+};
+
+/// kScene if every receiving object has TEXCOORD_1 in [0,1] and charts of different objects do not share texels,
+/// else kPerObject (objects with their own TEXCOORD_1 that does not overlap itself keep it, others get
+/// generate_atlas()).
+absl::StatusOr<AtlasLayout> make_layout(const Scene& scene, const LayoutOptions& options);
+
+}  // namespace lightloom
