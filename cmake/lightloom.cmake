@@ -27,6 +27,7 @@ find_package(nlohmann_json REQUIRED)
 find_package(spdlog CONFIG REQUIRED)
 find_package(CLI11 CONFIG REQUIRED)
 find_package(Vulkan REQUIRED)
+find_package(ZLIB REQUIRED)
 find_program(GRPC_CPP_PLUGIN grpc_cpp_plugin REQUIRED)
 
 # lightloom_module(<name> SOURCES <cpp>... [PUBLIC <targets>...] [PRIVATE <targets>...])

@@ -1,0 +1,122 @@
+#include "core/asset/asset.h"
+
+#include <map>
+#include <string>
+
+#include "core/base/file.h"
+
+namespace lightloom {
+namespace {
+
+absl::Status mismatch(const std::string& what) {
+  return absl::DataLossError(what + " does not match the manifest; bake again or fetch it again");
+}
+
+absl::Status in_context(const absl::Status& status, const std::string& what) {
+  return absl::Status(status.code(), what + ": " + std::string(status.message()));
+}
+
+/// Chunks may only name objects of the manifest, with the lightmap size it gives them.
+absl::Status check_object(const std::map<Digest, const ObjectEntry*>& objects, const ChunkObject& o,
+                          const std::string& what) {
+  const auto it = objects.find(o.id);
+  if (it == objects.end() || it->second->width != static_cast<int32_t>(o.width) ||
+      it->second->height != static_cast<int32_t>(o.height)) {
+    return mismatch(what + ": object " + o.id.hex().substr(0, 12));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status verify_cell(const Manifest& m, const CellEntry& entry, const CellChunk& chunk, const std::string& what) {
+  if (chunk.order != static_cast<uint32_t>(m.params.order) || chunk.probe_count != entry.probes ||
+      chunk.receivers.size() != entry.receivers || chunk.clusters.size() != entry.clusters) {
+    return mismatch(what);
+  }
+  for (uint32_t i = 0; i < entry.clusters; ++i) {
+    const ClusterEntry& c = m.clusters[entry.first_cluster + i];
+    if (c.receivers != chunk.clusters[i].receivers || c.rank != chunk.clusters[i].rank() ||
+        c.probes != chunk.clusters[i].probes.size()) {
+      return mismatch(what + ": cluster " + std::to_string(i));
+    }
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+std::filesystem::path ChunkStore::path(const Digest& digest) const {
+  const std::string hex = digest.hex();
+  return folder_ / hex.substr(0, 2) / hex.substr(2);
+}
+
+absl::StatusOr<ChunkRef> ChunkStore::put(std::span<const uint8_t> bytes) const {
+  const ChunkRef ref{sha256(bytes), bytes.size()};
+  std::error_code error;
+  const auto size = std::filesystem::file_size(path(ref.digest), error);
+  if (!error && size == bytes.size()) return ref;
+  LL_RETURN_IF_ERROR(write_file_atomic(path(ref.digest), bytes));
+  return ref;
+}
+
+absl::StatusOr<std::vector<uint8_t>> ChunkStore::get(const ChunkRef& ref) const {
+  LL_ASSIGN_OR_RETURN(auto bytes, read_file(path(ref.digest)));
+  if (bytes.size() != ref.size || sha256(bytes) != ref.digest) {
+    return absl::DataLossError("chunk " + path(ref.digest).string() +
+                               " does not have the bytes its name says; bake again or fetch it again");
+  }
+  return bytes;
+}
+
+ChunkStore chunk_store(const std::filesystem::path& loom) { return ChunkStore(loom / "chunks"); }
+
+absl::Status write_manifest(const std::filesystem::path& loom, const Manifest& manifest) {
+  return write_file_atomic(loom / "manifest", encode_manifest(manifest));
+}
+
+absl::StatusOr<Manifest> read_manifest(const std::filesystem::path& loom) {
+  const std::filesystem::path path = loom / "manifest";
+  LL_ASSIGN_OR_RETURN(const auto bytes, read_file(path));
+  auto manifest = decode_manifest(bytes);
+  if (!manifest.ok()) return in_context(manifest.status(), path.string());
+  return manifest;
+}
+
+absl::Status verify_asset(const std::filesystem::path& loom) {
+  LL_ASSIGN_OR_RETURN(const Manifest m, read_manifest(loom));
+  const ChunkStore store = chunk_store(loom);
+
+  std::map<Digest, const ObjectEntry*> objects;
+  for (const ObjectEntry& o : m.objects) objects[o.id] = &o;
+
+  for (const ObjectEntry& o : m.objects) {
+    if (o.surface.size == 0) continue;
+    const std::string what = "surface of object '" + o.name + "'";
+    LL_ASSIGN_OR_RETURN(const auto bytes, store.get(o.surface));
+    const auto chunk = decode_surface(bytes);
+    if (!chunk.ok()) return in_context(chunk.status(), what);
+    if (chunk->object.id != o.id) return mismatch(what);
+    LL_RETURN_IF_ERROR(check_object(objects, chunk->object, what));
+  }
+  for (size_t i = 0; i < m.probes.size(); ++i) {
+    const std::string what = "relight set of probe " + std::to_string(i);
+    LL_ASSIGN_OR_RETURN(const auto bytes, store.get(m.probes[i].relight));
+    const auto chunk = decode_relight(bytes);
+    if (!chunk.ok()) return in_context(chunk.status(), what);
+    if (chunk->rays.size() != static_cast<size_t>(m.params.relight_rays) ||
+        chunk->position != m.probes[i].position) {
+      return mismatch(what);
+    }
+    for (const ChunkObject& o : chunk->objects) LL_RETURN_IF_ERROR(check_object(objects, o, what));
+  }
+  for (size_t i = 0; i < m.cells.size(); ++i) {
+    const std::string what = "cell " + std::to_string(i);
+    LL_ASSIGN_OR_RETURN(const auto bytes, store.get(m.cells[i].chunk));
+    const auto chunk = decode_cell(bytes);
+    if (!chunk.ok()) return in_context(chunk.status(), what);
+    LL_RETURN_IF_ERROR(verify_cell(m, m.cells[i], *chunk, what));
+    for (const ChunkObject& o : chunk->objects) LL_RETURN_IF_ERROR(check_object(objects, o, what));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace lightloom
