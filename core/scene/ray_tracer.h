@@ -38,7 +38,7 @@ class RayTracer {
   Hit closest(Vec3 origin, Vec3 direction, float t_max = std::numeric_limits<float>::infinity()) const;
   /// Whether anything lies at t in (0, t_max).
   bool occluded(Vec3 origin, Vec3 direction, float t_max) const;
-  /// Whether the segment between two points on or off surfaces is free. Both ends are left out by `offset()`.
+  /// Whether the open segment between two points in free space is free. Push points on surfaces off by offset() first.
   bool visible(Vec3 from, Vec3 to) const;
 
   const Scene& scene() const;

@@ -1,0 +1,244 @@
+#include "core/probes/placement.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <set>
+
+#include "core/base/sampling.h"
+#include "core/probes/links.h"
+#include "core/receivers/open_space.h"
+
+namespace lightloom {
+namespace {
+
+using Cell = std::array<int32_t, 3>;
+
+constexpr int kCandidates = 24;       // fixed points per cell, tried in order
+constexpr uint32_t kSpaceRays = 24;   // rays that tell open space from solid
+constexpr size_t kTestReceivers = 64; // per cell, for repair
+constexpr uint32_t kTestRaysSide = 4;
+constexpr double kRepairShare = 0.01; // unseen share of a cell's test rays that calls for repair
+
+Cell cell_of(Vec3 p, float spacing) {
+  Cell c;
+  for (int a = 0; a < 3; ++a) c[static_cast<size_t>(a)] = static_cast<int32_t>(std::floor(static_cast<double>(p[a]) / spacing));
+  return c;
+}
+
+uint64_t cell_seed(const Cell& c) {
+  uint64_t h = 0x9b0be;
+  for (const int32_t i : c) h = hash_combine(h, static_cast<uint64_t>(static_cast<uint32_t>(i)));
+  return h;
+}
+
+FirstHits look_around(const RayTracer& tracer, Vec3 p) {
+  FirstHits f;
+  for (uint32_t i = 0; i < kSpaceRays; ++i) f.add(tracer.closest(p, sphere_direction(i, kSpaceRays)));
+  return f;
+}
+
+/// Point n of the cell's list: near the centre first, then spread by the R3 sequence (Roberts 2018).
+Vec3 candidate(const Cell& cell, float spacing, int n) {
+  Rng rng(cell_seed(cell));
+  const double j[3] = {rng.next_float(), rng.next_float(), rng.next_float()};
+  constexpr double kR3[3] = {0.8191725133961645, 0.6710436067037893, 0.5497004779019703};
+  Vec3 p;
+  for (int a = 0; a < 3; ++a) {
+    const double u = n == 0 ? 0.375 + 0.25 * j[a] : 0.05 + 0.9 * (j[a] + n * kR3[a] - std::floor(j[a] + n * kR3[a]));
+    p[a] = static_cast<float>((cell[static_cast<size_t>(a)] + u) * static_cast<double>(spacing));
+  }
+  return p;
+}
+
+/// First acceptable point, asking for less and less clearance.
+std::optional<Vec3> base_point(const RayTracer& tracer, const Cell& cell, float spacing) {
+  std::array<float, kCandidates> clearance{};  // −1: solid
+  for (const float wanted : {0.15f, 0.06f, 0.02f}) {
+    for (int n = 0; n < kCandidates; ++n) {
+      float& c = clearance[static_cast<size_t>(n)];
+      const Vec3 p = candidate(cell, spacing, n);
+      if (c == 0) {
+        const FirstHits f = look_around(tracer, p);
+        c = f.solid() ? -1 : f.nearest;
+      }
+      if (c >= wanted * spacing) return p;
+    }
+  }
+  return std::nullopt;
+}
+
+struct Unseen {
+  Vec3 from, to;  // receiver, and what it sees (pushed off)
+};
+
+/// Test rays of the cell's receivers whose hits no probe within reach sees.
+std::vector<Unseen> unseen_hits(const RayTracer& tracer, const Receivers& receivers, std::span<const uint32_t> tested,
+                                std::span<const Probe> probes, const ProbeGrid& grid, int reach, uint64_t* rays) {
+  const Scene& scene = tracer.scene();
+  std::vector<Unseen> out;
+  for (const uint32_t r : tested) {
+    const Receiver& receiver = receivers.all[r];
+    const auto near = grid.nearest(receiver.point.position, reach);
+    Rng rng(hash_combine(receiver.seed, 0x4e9a1));
+    for (uint32_t i = 0; i < kTestRaysSide * kTestRaysSide; ++i) {
+      const Sample2 uv = stratified(i, kTestRaysSide, &rng);
+      ++*rays;
+      const Hit hit = tracer.closest(receiver.point.position, leave(receiver.point, square_to_cosine_hemisphere(uv.u, uv.v)));
+      if (!hit) continue;
+      const Object& object = scene.objects[hit.object];
+      if (hit.back && !scene.materials[object.triangles[hit.triangle].material].double_sided) continue;
+      const Vec3 y = shading_point(object, hit.triangle, hit.b1, hit.b2, hit.back).position;
+      const bool seen = std::any_of(near.begin(), near.end(), [&](const ProbeGrid::Near& n) {
+        return tracer.visible(y, probes[n.probe].position);
+      });
+      if (!seen) out.push_back({receiver.point.position, y});
+    }
+  }
+  return out;
+}
+
+/// Greedy cover of the unseen hits by points on the way to them, at most one per octant of the cell.
+std::vector<Probe> repair(const RayTracer& tracer, const Cell& cell, float spacing, std::vector<Unseen> unseen,
+                          uint64_t rays) {
+  constexpr size_t kMaxTargets = 128, kMaxCandidates = 96;
+  const auto thin = [](auto* v, size_t n) {
+    if (v->size() <= n) return;
+    for (size_t i = 0; i < n; ++i) (*v)[i] = (*v)[i * v->size() / n];
+    v->resize(n);
+  };
+  const double share = static_cast<double>(unseen.size()) / static_cast<double>(rays);
+  thin(&unseen, kMaxTargets);
+
+  std::vector<Vec3> points;
+  for (const Unseen& u : unseen) {
+    for (const float t : {0.3f, 0.7f}) {
+      const Vec3 p = u.from + (u.to - u.from) * t;
+      if (cell_of(p, spacing) == cell) points.push_back(p);
+    }
+  }
+  thin(&points, kMaxCandidates);
+  std::erase_if(points, [&](Vec3 p) {
+    const FirstHits f = look_around(tracer, p);
+    return f.solid() || f.nearest < 0.01f * spacing;
+  });
+
+  const auto octant = [&](Vec3 p) {
+    uint32_t o = 0;
+    for (int a = 0; a < 3; ++a) {
+      const double u = static_cast<double>(p[a]) / spacing - cell[static_cast<size_t>(a)];
+      if (u >= 0.5) o |= 1u << a;
+    }
+    return o;
+  };
+  std::vector<std::vector<bool>> sees(points.size());
+  for (size_t i = 0; i < points.size(); ++i) {
+    for (const Unseen& u : unseen) sees[i].push_back(tracer.visible(u.to, points[i]));
+  }
+  std::vector<Probe> out;
+  std::vector<bool> covered(unseen.size(), false);
+  uint32_t used = 0;
+  size_t left = unseen.size();
+  while (share * static_cast<double>(left) / static_cast<double>(unseen.size()) > kRepairShare / 2) {
+    size_t best = points.size(), best_count = 0;
+    for (size_t i = 0; i < points.size(); ++i) {
+      if (used & 1u << octant(points[i])) continue;
+      size_t count = 0;
+      for (size_t k = 0; k < covered.size(); ++k) count += !covered[k] && sees[i][k];
+      if (count > best_count) best = i, best_count = count;
+    }
+    if (best == points.size()) break;
+    used |= 1u << octant(points[best]);
+    out.push_back({points[best], cell, 1 + octant(points[best])});
+    for (size_t k = 0; k < covered.size(); ++k) {
+      if (!covered[k] && sees[best][k]) covered[k] = true, --left;
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+absl::StatusOr<PlacementResult> place_probes(const RayTracer& tracer, const Receivers& receivers,
+                                             const PlacementOptions& options, const Parallel& parallel) {
+  const float spacing = options.spacing;
+
+  // Cells within one cell of a receiver.
+  std::map<Cell, std::vector<uint32_t>> home;
+  for (uint32_t r = 0; r < receivers.all.size(); ++r) {
+    home[cell_of(receivers.all[r].point.position, spacing)].push_back(r);
+  }
+  std::set<Cell> near;
+  for (const auto& [c, unused] : home) {
+    for (int32_t dx = -1; dx <= 1; ++dx) {
+      for (int32_t dy = -1; dy <= 1; ++dy) {
+        for (int32_t dz = -1; dz <= 1; ++dz) near.insert({c[0] + dx, c[1] + dy, c[2] + dz});
+      }
+    }
+  }
+
+  // Base probes.
+  const std::vector<Cell> cells(near.begin(), near.end());
+  std::vector<std::optional<Vec3>> points(cells.size());
+  if (!parallel_for(cells.size(), parallel, [&](uint64_t i) { points[i] = base_point(tracer, cells[i], spacing); })) {
+    return absl::CancelledError("cancelled while placing probes");
+  }
+  PlacementResult result;
+  for (size_t i = 0; i < cells.size(); ++i) {
+    if (points[i]) result.probes.push_back({*points[i], cells[i], 0});
+  }
+
+  // Repairs, each decided from base probes alone.
+  struct Home {
+    Cell cell;
+    std::vector<uint32_t> tested;
+    std::vector<Probe> repairs;
+    uint64_t rays = 0, unseen = 0;
+  };
+  std::vector<Home> homes;
+  for (auto& [c, list] : home) {
+    std::sort(list.begin(), list.end(), [&](uint32_t a, uint32_t b) {
+      return std::pair(mix64(receivers.all[a].seed), a) < std::pair(mix64(receivers.all[b].seed), b);
+    });
+    if (list.size() > kTestReceivers) list.resize(kTestReceivers);
+    homes.push_back({c, std::move(list), {}, 0, 0});
+  }
+  const ProbeGrid grid(result.probes, spacing);
+  const bool done = parallel_for(homes.size(), parallel, [&](uint64_t i) {
+    Home& h = homes[i];
+    auto unseen = unseen_hits(tracer, receivers, h.tested, result.probes, grid, options.nearest, &h.rays);
+    h.unseen = unseen.size();
+    if (static_cast<double>(h.unseen) > kRepairShare * static_cast<double>(h.rays)) {
+      h.repairs = repair(tracer, h.cell, spacing, std::move(unseen), h.rays);
+    }
+  });
+  if (!done) return absl::CancelledError("cancelled while repairing probes");
+
+  uint64_t rays = 0, unseen = 0;
+  std::vector<Probe> repairs;
+  for (const Home& h : homes) {
+    rays += h.rays;
+    unseen += h.unseen;
+    repairs.insert(repairs.end(), h.repairs.begin(), h.repairs.end());
+  }
+  result.unseen = rays > 0 ? static_cast<double>(unseen) / static_cast<double>(rays) : 0;
+  result.repairs = repairs.size();
+  result.probes.insert(result.probes.end(), repairs.begin(), repairs.end());
+  std::sort(result.probes.begin(), result.probes.end(), [](const Probe& a, const Probe& b) { return a.key() < b.key(); });
+  return result;
+}
+
+float default_spacing(const Aabb& bounds) {
+  const Vec3 s = bounds.size();
+  const double longest = std::max({s.x, s.y, s.z});
+  // A flat level still has a layer of cells.
+  const double floor = longest / 16;
+  const double volume = std::max<double>(s.x, floor) * std::max<double>(s.y, floor) * std::max<double>(s.z, floor);
+  const double wanted = std::cbrt(volume / 200);
+  if (!(wanted > 0)) return 1;
+  const double unit = std::pow(10.0, std::floor(std::log10(wanted)) - 1);
+  return static_cast<float>(std::round(wanted / unit) * unit);
+}
+
+}  // namespace lightloom

@@ -1,0 +1,24 @@
+// Inside or outside: do the rays that leave a point meet fronts or backs first?
+#pragma once
+
+#include "core/base/vec.h"
+#include "core/scene/ray_tracer.h"
+
+namespace lightloom {
+
+/// First hits of a set of rays.
+struct FirstHits {
+  int rays = 0, hits = 0, backs = 0;
+  float nearest = std::numeric_limits<float>::infinity();  ///< metres
+
+  void add(const Hit& hit) {
+    ++rays;
+    if (!hit) return;
+    ++hits;
+    if (hit.back) ++backs;
+    nearest = std::min(nearest, hit.t);
+  }
+  bool solid() const { return hits > 0 && 2 * backs >= hits; }
+};
+
+}  // namespace lightloom

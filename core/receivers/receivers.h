@@ -1,0 +1,45 @@
+// The points that the bake solves for: lightmap texels, on each side that lies in open space.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/base/parallel.h"
+#include "core/receivers/layout.h"
+#include "core/receivers/surface_point.h"
+#include "core/receivers/texels.h"
+#include "core/scene/ray_tracer.h"
+
+namespace lightloom {
+
+/// A texel side in open space. Its key names it within its object: side·w·h + y·w + x, side 0 the front, 1 the back.
+struct Receiver {
+  uint32_t object = 0;  ///< index into Scene::objects
+  uint32_t key = 0;
+  uint32_t texel = 0;   ///< index into the object's TexelGrid::texels
+  bool back = false;
+  ShadingPoint point;
+  uint64_t seed = 0;    ///< of (object id, key): all randomness of this receiver comes from here
+};
+
+struct Receivers {
+  static constexpr uint32_t kNone = 0xffffffffu;
+
+  std::vector<TexelGrid> grids;     ///< per object
+  std::vector<Receiver> all;        ///< sorted by (object, key)
+  std::vector<uint32_t> first;      ///< per object, its range of `all`; one more entry at the end
+  uint64_t solid_texels = 0;        ///< front sides dropped as inside solids
+
+  /// Index into `all`, or kNone.
+  uint32_t find(uint32_t object, uint32_t key) const;
+  /// The receiver whose texel a hit falls in, or the nearest one of the same object and side within 8 texels (texels
+  /// whose point lies inside a solid are not receivers though part of them may be seen), or kNone.
+  uint32_t locate(const AtlasLayout& layout, const Hit& hit) const;
+};
+
+/// Rasterises every object's lightmap and keeps the sides in open space. A side is solid if at least half of the first
+/// hits of its rays are back faces, whatever the material says. Backs are kept of double-sided materials only, and only
+/// where an eighth of the rays hit anything: a shell's outside that faces the void has nothing to gather.
+absl::StatusOr<Receivers> find_receivers(const RayTracer& tracer, const AtlasLayout& layout, const Parallel& parallel);
+
+}  // namespace lightloom

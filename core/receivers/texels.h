@@ -1,0 +1,54 @@
+// Which texels of an object's lightmap hold surface, and where.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/base/sampling.h"
+#include "core/base/vec.h"
+#include "core/receivers/atlas.h"
+#include "core/scene/scene.h"
+
+namespace lightloom {
+
+/// A part of a triangle inside one texel.
+struct Fragment {
+  uint32_t triangle = 0;
+  float area = 0;  ///< m²
+};
+
+/// A texel that surface covers. Its point is the texel's centre where a triangle covers it, else the centroid of the
+/// largest fragment.
+struct Texel {
+  uint32_t x = 0, y = 0;
+  uint32_t triangle = 0;
+  float b1 = 0, b2 = 0;         ///< of the point in `triangle`
+  bool centre_covered = false;
+  float area = 0;               ///< m² of surface inside the texel
+  uint32_t first_fragment = 0, fragments = 0;  ///< range of TexelGrid::fragments
+};
+
+/// Texels in row order (y, then x).
+struct TexelGrid {
+  int width = 0, height = 0;
+  std::vector<Texel> texels;
+  std::vector<Fragment> fragments;
+};
+
+/// Conservative rasterisation of the object's lightmap. A texel is kept if a triangle covers its centre or surface
+/// covers ≥ 1/16 of it, or if a triangle would otherwise have no texel at all.
+TexelGrid rasterise(const Object& object, const LightmapUv& uv);
+
+/// A point drawn uniformly by lightmap area over the part of the texel that faces like its own point (normals within
+/// 45°): the samples whose average is the texel's value.
+struct SurfacePoint {
+  uint32_t triangle = 0;
+  float b1 = 0, b2 = 0;
+};
+SurfacePoint sample_texel(const Object& object, const LightmapUv& uv, const TexelGrid& grid, const Texel& texel,
+                          Sample2 jitter);
+
+/// Unit normal of the front side by winding.
+Vec3 geometric_normal(const Object& object, uint32_t triangle);
+
+}  // namespace lightloom
