@@ -1,0 +1,98 @@
+#include <OpenEXR/ImfChannelList.h>
+#include <OpenEXR/ImfFrameBuffer.h>
+#include <OpenEXR/ImfHeader.h>
+#include <OpenEXR/ImfInputFile.h>
+#include <OpenEXR/ImfOutputFile.h>
+
+#include <exception>
+#include <system_error>
+
+#include "core/base/file.h"
+#include "core/scene/image.h"
+
+namespace lightloom {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int64_t kMaxValues = int64_t{1} << 28;
+
+absl::Status cannot_write(const fs::path& path, const std::string& why) {
+  return absl::InvalidArgumentError("cannot write " + path.string() + ": " + why);
+}
+
+}  // namespace
+
+absl::Status write_exr(const Image& image, const fs::path& path) {
+  const auto pixels = static_cast<size_t>(image.width) * static_cast<size_t>(image.height);
+  if (image.width <= 0 || image.height <= 0 || image.channels.empty()) return cannot_write(path, "the image is empty");
+  std::error_code code;
+  if (path.has_parent_path()) fs::create_directories(path.parent_path(), code);
+  if (code) return cannot_write(path, code.message());
+
+  const fs::path temporary = temporary_beside(path);
+  try {
+    Imf::Header header(image.width, image.height);
+    header.compression() = Imf::ZIP_COMPRESSION;
+    Imf::FrameBuffer frame;
+    for (const Image::Channel& c : image.channels) {
+      if (c.values.size() != pixels) return cannot_write(path, "channel " + c.name + " has the wrong size");
+      header.channels().insert(c.name, Imf::Channel(Imf::FLOAT));
+      // OpenEXR's slices are not const, but writing only reads them.
+      auto* base = reinterpret_cast<char*>(const_cast<float*>(c.values.data()));
+      frame.insert(c.name, Imf::Slice(Imf::FLOAT, base, sizeof(float), sizeof(float) * static_cast<size_t>(image.width)));
+    }
+    Imf::OutputFile file(temporary.c_str(), header);
+    file.setFrameBuffer(frame);
+    file.writePixels(image.height);
+  } catch (const std::exception& e) {
+    fs::remove(temporary, code);
+    return cannot_write(path, e.what());
+  }
+  return commit_file(temporary, path);
+}
+
+absl::StatusOr<Image> read_exr(const fs::path& path) {
+  const auto broken = [&](const std::string& why) {
+    return absl::InvalidArgumentError(path.string() + " is not a readable EXR: " + why);
+  };
+  std::error_code code;
+  if (!fs::exists(path, code)) return absl::NotFoundError("cannot open " + path.string() + ": no such file");
+  if (!fs::is_regular_file(path, code)) return broken("it is not a regular file");
+  try {
+    Imf::InputFile file(path.c_str());
+    const Imath::Box2i window = file.header().dataWindow();
+    const int64_t width = int64_t{window.max.x} - window.min.x + 1, height = int64_t{window.max.y} - window.min.y + 1;
+    int64_t count = 0;
+    for (auto c = file.header().channels().begin(); c != file.header().channels().end(); ++c) {
+      if (c.channel().xSampling != 1 || c.channel().ySampling != 1) {
+        return broken(std::string("channel ") + c.name() + " is subsampled; save it at full resolution");
+      }
+      ++count;
+    }
+    if (width <= 0 || height <= 0 || count == 0) return broken("it has no pixels");
+    if (width > kMaxValues || height > kMaxValues / width || count > kMaxValues / (width * height)) {
+      return broken("it has more than 2^28 values; scale it down");
+    }
+
+    Image image;
+    image.width = static_cast<int>(width);
+    image.height = static_cast<int>(height);
+    const auto pixels = static_cast<size_t>(width * height);
+    for (auto c = file.header().channels().begin(); c != file.header().channels().end(); ++c) {
+      image.channels.push_back({c.name(), std::vector<float>(pixels)});
+    }
+    Imf::FrameBuffer frame;
+    for (Image::Channel& c : image.channels) {
+      frame.insert(c.name, Imf::Slice::Make(Imf::FLOAT, c.values.data(), window, sizeof(float),
+                                            sizeof(float) * static_cast<size_t>(width)));
+    }
+    file.setFrameBuffer(frame);
+    file.readPixels(window.min.y, window.max.y);
+    return image;
+  } catch (const std::exception& e) {
+    return broken(e.what());
+  }
+}
+
+}  // namespace lightloom
