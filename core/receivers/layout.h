@@ -27,16 +27,20 @@ struct Placement {
 /// and size 0.
 struct AtlasLayout {
   LayoutMode mode = LayoutMode::kScene;
-  int width = 0, height = 0;  ///< of the output image
+  int width = 0, height = 0;  ///< of the output image; 0 if no object has a lightmap
+  float texels_per_metre = 0;  ///< what the sizes follow, before Object::texel_scale
   std::vector<LightmapUv> uv;
   std::vector<Placement> placements;
 };
 
 struct LayoutOptions {
   int lightmap_size = 0;         ///< side of the scene atlas, texels; 0: from texels_per_metre
-  float texels_per_metre = 0;    ///< 0: chosen from the scene's area so that it has about 2^16 texels
-  /// Placements of an earlier layout, by object id with the size it had; objects found here with equal size keep
-  /// their place, others take free space, the image grows in height only.
+  /// 0: chosen from the scene's area so that its objects have about lightmap_size² texels, 2^16 if that is 0 too,
+  /// and rounded so that small edits do not change it.
+  float texels_per_metre = 0;
+  /// Placements of an earlier layout of mode kPerObject, by object id with the size it had; objects found here with
+  /// equal size keep their place, others take free space, the image grows in height only. With earlier_width > 0 the
+  /// mode stays kPerObject.
   struct Earlier {
     Placement placement;
     int width = 0, height = 0;
@@ -47,7 +51,8 @@ struct LayoutOptions {
 
 /// kScene if every receiving object has TEXCOORD_1 in [0,1] and charts of different objects do not share texels,
 /// else kPerObject (objects with their own TEXCOORD_1 that does not overlap itself keep it, others get
-/// generate_atlas()).
+/// generate_atlas()). "Share" is judged by texel centres and forgives one in a thousand. Errors: lightmaps too large
+/// for an image of 16384 × 16384, numbers out of range.
 absl::StatusOr<AtlasLayout> make_layout(const Scene& scene, const LayoutOptions& options);
 
 }  // namespace lightloom
