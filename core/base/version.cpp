@@ -1,0 +1,7 @@
+#include "core/base/version.h"
+
+namespace lightloom {
+
+constinit const std::string_view kVersion = LIGHTLOOM_VERSION;
+
+}  // namespace lightloom
