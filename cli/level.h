@@ -1,0 +1,26 @@
+// What several commands do first: load a level, put a rig of lights in it, and lay out its lightmap.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "core/base/status.h"
+#include "core/receivers/layout.h"
+#include "core/scene/ray_tracer.h"
+#include "core/scene/scene.h"
+
+namespace lightloom {
+
+/// The scene and its ray tracer, which points into it.
+struct Level {
+  std::unique_ptr<Scene> scene;
+  std::unique_ptr<RayTracer> tracer;
+};
+
+/// `lights` empty: the lights of the glTF. Warnings of the scene go to stderr.
+absl::StatusOr<Level> load_level(const std::string& path, const std::string& lights = "", const std::string& rig = "");
+
+/// The scene's camera of that name, or its first one if the name is empty.
+absl::StatusOr<Camera> find_camera(const Scene& scene, const std::string& name);
+
+}  // namespace lightloom
