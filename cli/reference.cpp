@@ -14,7 +14,7 @@ namespace lightloom {
 namespace {
 
 struct Options {
-  std::string scene, output, lights, rig, camera;
+  std::string scene, output, lights, rig, camera, footprint = "texel";
   int bounces = 1, samples = 1024, lightmap_size = 0, width = 512, threads = 0;
   float texels_per_metre = 0;
   uint64_t seed = 1;
@@ -26,12 +26,16 @@ absl::Status run(const Options& o) {
     return absl::InvalidArgumentError("--bounces must be ≥ 0 and --samples ≥ 2");
   }
   if (o.width < 1 || o.width > 16384) return absl::InvalidArgumentError("--width must be 1 to 16384");
+  if (o.footprint != "texel" && o.footprint != "cycles") {
+    return absl::InvalidArgumentError("--footprint must be texel or cycles");
+  }
   LL_ASSIGN_OR_RETURN(const Level level, load_level(o.scene, o.lights, o.rig));
   ProgressBar bar;
   ReferenceOptions options;
   options.bounces = o.bounces;
   options.samples = o.samples;
   options.seed = o.seed;
+  options.footprint = o.footprint == "cycles" ? Footprint::kCycles : Footprint::kTexel;
   options.parallel = bar.parallel("tracing", o.threads);
 
   const auto start = std::chrono::steady_clock::now();
@@ -76,6 +80,7 @@ Command reference_command() {
            {"--texels-per-metre", "lightmap density; 0: chosen from the scene", &o->texels_per_metre},
            {"--camera", "render this camera ('first': the first one) in place of the lightmap", &o->camera},
            {"--width", "pixels across, with --camera", &o->width},
+           {"--footprint", "texel: average over the whole texel; cycles: as Blender Cycles 3.4 bakes do", &o->footprint},
            {"--seed", "of the random numbers", &o->seed},
            {"--threads", "0: one per hardware thread", &o->threads},
            {"--json", "print the result as JSON", &o->json}},

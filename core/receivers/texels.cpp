@@ -196,11 +196,47 @@ TexelGrid rasterise(const Object& object, const LightmapUv& uv) {
   return grid;
 }
 
+namespace {
+
+Vec3 position(const Object& object, const SurfacePoint& s) {
+  return interpolate(object.positions, object.triangles[s.triangle], s.b1, s.b2);
+}
+
+/// Metres per texel around a triangle.
+float texel_size(const Object& object, const std::array<Vec2, 3>& c, uint32_t triangle) {
+  const double uv_area = std::abs(cross({c[0].x, c[0].y}, {c[1].x, c[1].y}, {c[2].x, c[2].y})) / 2;
+  return uv_area > 0 ? static_cast<float>(std::sqrt(world_area(object, triangle) / uv_area)) : 0;
+}
+
+/// Cycles 3.4 jitters by uv differentials that Blender computes at half their size, and folds what leaves the triangle
+/// back by its first two barycentrics (bake_differentials in bake.c, bake_clamp_mirror_repeat in init_from_bake.h).
+SurfacePoint sample_as_cycles(const LightmapUv& uv, const Texel& texel, Sample2 jitter) {
+  const auto& c = uv.corners[texel.triangle];
+  const Point p{texel.x + 0.25 + jitter.u / 2, texel.y + 0.25 + jitter.v / 2};
+  const Point p0{c[0].x, c[0].y}, p1{c[1].x, c[1].y}, p2{c[2].x, c[2].y};
+  const double det = cross(p0, p1, p2);
+  if (det == 0) return {texel.triangle, texel.b1, texel.b2};
+  const auto fold = [](double u, double limit) {
+    if (!(limit > 0)) return 0.0;
+    u /= limit;
+    const double whole = std::floor(u);
+    u -= whole;
+    return (std::fmod(whole, 2) != 0 ? 1 - u : u) * limit;
+  };
+  const double u = fold(cross(p, p1, p2) / det, 1);
+  const double v = fold(cross(p0, p, p2) / det, 1 - u);
+  return {texel.triangle, static_cast<float>(v), static_cast<float>(std::max(0.0, 1 - u - v))};
+}
+
+}  // namespace
+
 SurfacePoint sample_texel(const Object& object, const LightmapUv& uv, const TexelGrid& grid, const Texel& texel,
-                          Sample2 jitter) {
+                          Sample2 jitter, Footprint footprint) {
+  if (footprint == Footprint::kCycles) return sample_as_cycles(uv, texel, jitter);
   const SurfacePoint own{texel.triangle, texel.b1, texel.b2};
-  if (texel.fragments == 1 && texel.centre_covered && texel.area == 0) return own;
-  const Vec3 normal = geometric_normal(object, texel.triangle);
+  const Vec3 normal = geometric_normal(object, texel.triangle), centre = position(object, own);
+  // Other charts may share the texel: what continues the surface lies within its diagonal and faces alike.
+  const float reach = 1.5f * texel_size(object, uv.corners[texel.triangle], texel.triangle);
   // Rejection over the texel's square. Successive points follow the R2 sequence (Roberts 2018) from the jitter, so the
   // first, and mostly only, point keeps the caller's stratification.
   double x = jitter.u, y = jitter.v;
@@ -210,7 +246,10 @@ SurfacePoint sample_texel(const Object& object, const LightmapUv& uv, const Texe
       const uint32_t t = grid.fragments[texel.first_fragment + f].triangle;
       SurfacePoint s{t, 0, 0};
       if (!barycentric(uv.corners[t], p, 0, &s.b1, &s.b2)) continue;
-      if (t != texel.triangle && dot(geometric_normal(object, t), normal) < 0.7071f) continue;
+      if (t != texel.triangle && (dot(geometric_normal(object, t), normal) < 0.7071f ||
+                                  length(position(object, s) - centre) > reach)) {
+        continue;
+      }
       return s;
     }
     x += 0.7548776662466927;

@@ -39,14 +39,19 @@ struct TexelGrid {
 /// covers ≥ 1/16 of it, or if a triangle would otherwise have no texel at all.
 TexelGrid rasterise(const Object& object, const LightmapUv& uv);
 
-/// A point drawn uniformly by lightmap area over the part of the texel that faces like its own point (normals within
-/// 45°): the samples whose average is the texel's value.
+enum class Footprint : uint8_t {
+  kTexel,   ///< uniform by area over the surface in the texel that continues the surface at its point
+  kCycles,  ///< as Blender Cycles 3.4 bakes: the middle half of the texel, mirrored into the triangle of its centre
+};
+
+/// A point on the surface in the texel, for a jitter uniform in the unit square: averages over many are the texel's
+/// value. REQUIRES for kCycles: the texel's centre is covered.
 struct SurfacePoint {
   uint32_t triangle = 0;
   float b1 = 0, b2 = 0;
 };
 SurfacePoint sample_texel(const Object& object, const LightmapUv& uv, const TexelGrid& grid, const Texel& texel,
-                          Sample2 jitter);
+                          Sample2 jitter, Footprint footprint = Footprint::kTexel);
 
 /// Unit normal of the front side by winding.
 Vec3 geometric_normal(const Object& object, uint32_t triangle);

@@ -7,7 +7,6 @@
 #include <functional>
 #include <vector>
 
-#include "core/receivers/texels.h"
 
 namespace lightloom {
 namespace {
@@ -111,7 +110,7 @@ absl::StatusOr<ReferenceResult> reference_lightmap(const RayTracer& tracer, cons
     const TexelGrid& grid = grids[items[i].object];
     const Texel& texel = grid.texels[items[i].texel];
     const auto point = [&](Sample2 jitter) {
-      const SurfacePoint s = sample_texel(object, layout.uv[items[i].object], grid, texel, jitter);
+      const SurfacePoint s = sample_texel(object, layout.uv[items[i].object], grid, texel, jitter, options.footprint);
       return shading_point(object, s.triangle, s.b1, s.b2, false);
     };
     const uint64_t key = hash_combine(hash_combine(object.id.low64(), static_cast<uint64_t>(texel.y) << 32 | texel.x),

@@ -10,6 +10,7 @@
 #include "core/base/sampling.h"
 #include "core/receivers/layout.h"
 #include "core/receivers/surface_point.h"
+#include "core/receivers/texels.h"
 #include "core/scene/image.h"
 #include "core/scene/ray_tracer.h"
 
@@ -19,6 +20,7 @@ struct ReferenceOptions {
   int bounces = 1;
   int samples = 1024;  ///< paths per texel or pixel; half of them with each of two seeds
   uint64_t seed = 1;
+  Footprint footprint = Footprint::kTexel;
   Parallel parallel;
 };
 
@@ -29,7 +31,7 @@ struct ReferenceResult {
   double noise = 0;
 };
 
-/// E per front-side texel in the image layout, averaged over the covered texel.
+/// E per front-side texel in the image layout, averaged over the texel by its footprint.
 absl::StatusOr<ReferenceResult> reference_lightmap(const RayTracer& tracer, const AtlasLayout& layout,
                                                    const ReferenceOptions& options);
 

@@ -1,0 +1,116 @@
+#include "core/bake/bake.h"
+
+#include <chrono>
+#include <mutex>
+
+namespace lightloom {
+namespace {
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// Writes chunks from several threads and keeps the first error.
+class ChunkWriter {
+ public:
+  explicit ChunkWriter(ChunkStore store) : store_(std::move(store)) {}
+
+  ChunkRef put(std::span<const uint8_t> bytes) {
+    const auto start = std::chrono::steady_clock::now();
+    auto ref = store_.put(bytes);
+    const std::lock_guard lock(mutex_);
+    seconds_ += seconds_since(start);
+    if (!ref.ok()) {
+      if (status_.ok()) status_ = ref.status();
+      return {};
+    }
+    return *ref;
+  }
+  const absl::Status& status() const { return status_; }
+  double seconds() const { return seconds_; }
+
+ private:
+  ChunkStore store_;
+  std::mutex mutex_;
+  absl::Status status_;  // guarded by mutex_, like the next
+  double seconds_ = 0;
+};
+
+void add_cell(const CellResult& c, BakeReport* report) {
+  report->rays_gather += c.stats.gather_rays;
+  report->rays_visibility += c.stats.visibility_rays;
+  report->unseen += c.stats.unseen;
+  report->clusters += c.chunk.clusters.size();
+  for (const CellChunk::Cluster& k : c.chunk.clusters) {
+    report->coefficients += static_cast<double>(k.rank()) * k.receivers;
+    report->bytes_projection += k.projection.size() * sizeof(Half) + k.correction.size() * sizeof(float);
+    report->bytes_reconstruction += k.reconstruction.size() * sizeof(Half);
+  }
+  report->bytes_reconstruction += c.chunk.uniform.size() * sizeof(uint16_t);
+}
+
+}  // namespace
+
+absl::StatusOr<BakeReport> bake(const RayTracer& tracer, const BakeParams& params, const std::filesystem::path& loom,
+                                const BakeControl& control) {
+  const auto start = std::chrono::steady_clock::now();
+  const Scene& scene = tracer.scene();
+  BakeReport report;
+  LL_ASSIGN_OR_RETURN(const Plan plan, make_plan(tracer, params, control));
+  report.seconds_plan = seconds_since(start);
+  report.receivers = plan.receivers.all.size();
+  report.repairs = plan.placement.repairs;
+  report.cells = plan.cells.size();
+
+  ChunkWriter writer(chunk_store(loom));
+  const auto cells_start = std::chrono::steady_clock::now();
+  std::vector<CellResult> cells(plan.cells.size());
+  std::vector<ChunkRef> cell_refs(plan.cells.size());
+  bool done = parallel_for(cells.size(), control.stage("cells"), [&](uint64_t i) {
+    cells[i] = bake_cell(tracer, make_cell_task(plan, scene, plan.cells[i]));
+    cell_refs[i] = writer.put(encode_cell(cells[i].chunk));
+  });
+  if (!done) return absl::CancelledError("bake cancelled; finished chunks are kept, the old manifest stays in force");
+  LL_RETURN_IF_ERROR(writer.status());
+  double transport = 0, compress = 0;
+  for (const CellResult& c : cells) {
+    add_cell(c, &report);
+    transport += c.transport_seconds;
+    compress += c.compress_seconds;
+  }
+  // The threads' shares of the stage's wall time.
+  const double cells_seconds = seconds_since(cells_start);
+  if (transport + compress > 0) {
+    report.seconds_transport = cells_seconds * transport / (transport + compress);
+    report.seconds_compress = cells_seconds - report.seconds_transport;
+  }
+
+  const std::vector<uint32_t> used = used_probes(cells);
+  report.probes = used.size();
+  std::vector<ChunkRef> relight(used.size());
+  done = parallel_for(used.size(), control.stage("relight rays"), [&](uint64_t i) {
+    relight[i] = writer.put(encode_relight(bake_relight(tracer, plan, plan.placement.probes[used[i]].position)));
+  });
+  if (!done) return absl::CancelledError("bake cancelled; finished chunks are kept, the old manifest stays in force");
+  std::vector<ChunkRef> surfaces(scene.objects.size());
+  for (uint32_t o = 0; o < surfaces.size(); ++o) {
+    if (plan.layout.uv[o].corners.empty()) continue;
+    const SurfaceChunk surface = make_surface(plan, scene, o);
+    if (!surface.keys.empty()) surfaces[o] = writer.put(encode_surface(surface));
+  }
+  LL_RETURN_IF_ERROR(writer.status());
+  report.seconds_write = writer.seconds();
+
+  const Manifest manifest = assemble(plan, scene, cells, cell_refs, relight, surfaces);
+  LL_RETURN_IF_ERROR(write_manifest(loom, manifest));
+  for (const auto* refs : {&cell_refs, &relight, &surfaces}) {
+    for (const ChunkRef& ref : *refs) report.bytes_total += ref.size;
+  }
+  for (const ChunkRef& ref : relight) report.bytes_relight += ref.size;
+  report.bytes_total += encode_manifest(manifest).size();
+  if (report.receivers > 0) report.coefficients /= static_cast<double>(report.receivers);
+  report.seconds_total = seconds_since(start);
+  return report;
+}
+
+}  // namespace lightloom

@@ -1,0 +1,33 @@
+// A whole bake on this machine.
+#pragma once
+
+#include <filesystem>
+
+#include "core/asset/asset.h"
+#include "core/bake/plan.h"
+#include "core/bake/tasks.h"
+
+namespace lightloom {
+
+struct BakeReport {
+  uint64_t receivers = 0, probes = 0, repairs = 0, clusters = 0, cells = 0, cells_reused = 0;
+  uint64_t rays_gather = 0, rays_visibility = 0, unseen = 0;
+  double coefficients = 0;  ///< mean rank per receiver
+  double seconds_total = 0, seconds_plan = 0;
+  double seconds_transport = 0, seconds_compress = 0;  ///< wall time of the cell stage, split by its threads' time
+  double seconds_write = 0;
+  uint64_t bytes_total = 0, bytes_projection = 0, bytes_reconstruction = 0, bytes_relight = 0;
+};
+
+/// Bakes into the folder `loom`. The old manifest, if any, stays in force until the new one replaces it whole.
+absl::StatusOr<BakeReport> bake(const RayTracer& tracer, const BakeParams& params, const std::filesystem::path& loom,
+                                const BakeControl& control);
+
+/// The manifest of finished tasks. `cells[i]` and `cell_refs[i]` belong to plan.cells[i]; `relight` and `surfaces` to
+/// the probes of used_probes(cells) and to the scene's objects.
+std::vector<uint32_t> used_probes(const std::vector<CellResult>& cells);
+Manifest assemble(const Plan& plan, const Scene& scene, const std::vector<CellResult>& cells,
+                  const std::vector<ChunkRef>& cell_refs, const std::vector<ChunkRef>& relight,
+                  const std::vector<ChunkRef>& surfaces);
+
+}  // namespace lightloom

@@ -1,0 +1,138 @@
+#include "core/bake/plan.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "core/base/sh.h"
+
+namespace lightloom {
+namespace {
+
+absl::Status check(const BakeParams& p) {
+  const auto bad = [](const std::string& what) { return absl::InvalidArgumentError(what); };
+  if (p.order < 0 || p.order > kMaxShOrder) return bad("--order must be 0 to " + std::to_string(kMaxShOrder));
+  if (!(p.spacing >= 0) || !std::isfinite(p.spacing)) return bad("--spacing must be a positive number of metres");
+  if (p.links < 1 || p.links > 32) return bad("--links must be 1 to 32");
+  if (p.rays < 1 || p.rays > 65536) return bad("--rays must be 1 to 65536");
+  if (p.relight_rays < 1 || p.relight_rays > 1 << 20) return bad("--relight-rays must be 1 to 1048576");
+  if (p.max_rank < 0 || p.max_rank > 256) return bad("--max-rank must be 0 to 256");
+  if (!(p.threshold >= 0) || !std::isfinite(p.threshold)) return bad("--threshold must be ≥ 0");
+  if (p.cell_receivers < 16 || p.cell_receivers > 1 << 16) return bad("--cell-receivers must be 16 to 65536");
+  if (!(p.texels_per_metre >= 0) || !std::isfinite(p.texels_per_metre)) return bad("--texels-per-metre must be ≥ 0");
+  if (p.lightmap_size < 0 || p.lightmap_size > 16384) return bad("--lightmap-size must be 0 to 16384");
+  return absl::OkStatus();
+}
+
+/// Octree over the world: the root is the same for every level, so a leaf depends on the receivers above it only.
+class Octree {
+ public:
+  Octree(const Receivers& receivers, uint32_t limit) : receivers_(receivers), limit_(limit) {}
+
+  std::vector<PlannedCell> leaves(std::vector<uint32_t> all) {
+    split(kRootLevel + 1, {0, 0, 0}, std::move(all), true);
+    return std::move(leaves_);
+  }
+
+ private:
+  static constexpr int32_t kRootLevel = 20;   // cells of 2^20 m around the origin
+  static constexpr int32_t kLeafLevel = -20;  // a heap of coincident receivers stays one cell
+
+  void split(int32_t level, GridCell cell, std::vector<uint32_t> receivers, bool root) {
+    if (receivers.empty()) return;
+    if (!root && (receivers.size() < limit_ || level <= kLeafLevel)) {
+      leaves_.push_back({level, cell, std::move(receivers)});
+      return;
+    }
+    const double side = std::ldexp(1.0, level - 1);
+    std::array<std::vector<uint32_t>, 8> children;
+    std::array<GridCell, 8> cells{};
+    for (size_t o = 0; o < 8; ++o) {
+      for (size_t a = 0; a < 3; ++a) {
+        const int32_t bit = static_cast<int32_t>(o >> (2 - a) & 1);
+        cells[o][a] = root ? bit - 1 : 2 * cell[a] + bit;
+      }
+    }
+    for (const uint32_t r : receivers) {
+      size_t o = 0;
+      for (size_t a = 0; a < 3; ++a) {
+        const auto i = static_cast<int64_t>(std::floor(receivers_.all[r].point.position[static_cast<int>(a)] / side));
+        const int64_t lowest = root ? -1 : 2 * static_cast<int64_t>(cell[a]);
+        if (i > lowest) o |= 4u >> a;
+      }
+      children[o].push_back(r);
+    }
+    receivers.clear();
+    receivers.shrink_to_fit();
+    for (size_t o = 0; o < 8; ++o) split(level - 1, cells[o], std::move(children[o]), false);
+  }
+
+  const Receivers& receivers_;
+  uint32_t limit_;
+  std::vector<PlannedCell> leaves_;
+};
+
+}  // namespace
+
+Parallel BakeControl::stage(const std::string& name) const {
+  Parallel how;
+  how.threads = threads;
+  how.cancel = cancel;
+  if (progress) {
+    how.progress = [report = progress, name](uint64_t done, uint64_t total) { report(name, done, total); };
+  }
+  return how;
+}
+
+absl::StatusOr<Plan> make_plan(const RayTracer& tracer, const BakeParams& request, const BakeControl& control) {
+  LL_RETURN_IF_ERROR(check(request));
+  const Scene& scene = tracer.scene();
+  Plan plan;
+  plan.params = request;
+
+  // Choose what the request leaves open, and record it.
+  const int side = std::max(1, static_cast<int>(std::lround(std::sqrt(static_cast<double>(request.rays)))));
+  plan.params.rays = side * side;
+  if (plan.params.spacing == 0) plan.params.spacing = default_spacing(scene.bounds());
+  LayoutOptions layout_options;
+  layout_options.lightmap_size = request.lightmap_size;
+  layout_options.texels_per_metre = request.texels_per_metre;
+  LL_ASSIGN_OR_RETURN(plan.layout, make_layout(scene, layout_options));
+  plan.params.texels_per_metre = plan.layout.texels_per_metre;
+  if (plan.layout.mode == LayoutMode::kScene) plan.params.lightmap_size = plan.layout.width;
+
+  LL_ASSIGN_OR_RETURN(plan.receivers, find_receivers(tracer, plan.layout, control.stage("receivers")));
+  if (plan.receivers.all.empty()) {
+    return absl::InvalidArgumentError(
+        "no lightmap texel lies in open space: give the level static objects that receive a lightmap, and check that "
+        "its normals do not all point into solids");
+  }
+  PlacementOptions placement;
+  placement.spacing = plan.params.spacing;
+  placement.nearest = plan.params.links + kFallbacks;
+  LL_ASSIGN_OR_RETURN(plan.placement, place_probes(tracer, plan.receivers, placement, control.stage("probes")));
+
+  std::vector<uint32_t> all(plan.receivers.all.size());
+  for (uint32_t i = 0; i < all.size(); ++i) all[i] = i;
+  std::sort(all.begin(), all.end(), [&](uint32_t a, uint32_t b) {
+    const Receiver &ra = plan.receivers.all[a], &rb = plan.receivers.all[b];
+    if (ra.object == rb.object) return ra.key < rb.key;
+    return scene.objects[ra.object].id < scene.objects[rb.object].id;
+  });
+  plan.cells = Octree(plan.receivers, static_cast<uint32_t>(plan.params.cell_receivers)).leaves(std::move(all));
+  return plan;
+}
+
+Digest scene_hash(const Scene& scene) {
+  std::vector<const Object*> objects;
+  for (const Object& object : scene.objects) {
+    if (object.is_static) objects.push_back(&object);
+  }
+  std::sort(objects.begin(), objects.end(), [](const Object* a, const Object* b) { return a->id < b->id; });
+  Hasher h;
+  h.string("scene");
+  for (const Object* o : objects) h.digest(o->id).value(o->receive).value(o->texel_scale);
+  return h.finish();
+}
+
+}  // namespace lightloom

@@ -1,0 +1,55 @@
+// What a bake will do, from the scene alone: receivers, probes, and the bake cells that split the work.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "core/asset/manifest.h"
+#include "core/base/parallel.h"
+#include "core/probes/placement.h"
+#include "core/receivers/layout.h"
+#include "core/receivers/receivers.h"
+#include "core/scene/ray_tracer.h"
+
+namespace lightloom {
+
+/// Names a stage and how far it is; called from worker threads, one call at a time.
+using StageProgress = std::function<void(const std::string& stage, uint64_t done, uint64_t total)>;
+
+struct BakeControl {
+  int threads = 0;  ///< 0: one per hardware thread
+  const CancelFlag* cancel = nullptr;
+  StageProgress progress;
+
+  Parallel stage(const std::string& name) const;
+};
+
+/// A world octree cell with fewer receivers than BakeParams::cell_receivers: one task.
+struct PlannedCell {
+  int32_t level = 0;  ///< covers [i, i+1)·2^level metres
+  GridCell cell{};
+  std::vector<uint32_t> receivers;  ///< indices into Receivers::all, sorted by (object id, key)
+};
+
+struct Plan {
+  BakeParams params;  ///< with nothing left to choose
+  AtlasLayout layout;
+  Receivers receivers;
+  PlacementResult placement;
+  std::vector<PlannedCell> cells;
+};
+
+/// Probes that a receiver may read besides its k links: the one that sets the support radius, and fallbacks.
+inline constexpr int kFallbacks = 16;
+
+/// Errors: parameters out of range, a scene without receivers, cancellation.
+absl::StatusOr<Plan> make_plan(const RayTracer& tracer, const BakeParams& request, const BakeControl& control);
+
+/// Everything in the scene that the transport depends on: geometry, alpha masks, sidedness, what receives; not
+/// albedo, emission or lights.
+Digest scene_hash(const Scene& scene);
+
+}  // namespace lightloom

@@ -1,0 +1,176 @@
+#include "core/bake/tasks.h"
+
+#include <algorithm>
+#include <chrono>
+#include <map>
+
+#include "core/compression/clusters.h"
+#include "core/probes/links.h"
+
+namespace lightloom {
+namespace {
+
+ChunkObject chunk_object(const Plan& plan, const Scene& scene, uint32_t object) {
+  const LightmapUv& uv = plan.layout.uv[object];
+  return {scene.objects[object].id, static_cast<uint32_t>(uv.width), static_cast<uint32_t>(uv.height)};
+}
+
+/// Numbers things in the order in which their ids sort, so that a chunk's tables do not depend on the scene's order.
+template <class Id>
+std::map<Id, uint32_t> enumerate(std::vector<Id> ids) {
+  std::sort(ids.begin(), ids.end());
+  std::map<Id, uint32_t> slots;
+  for (const Id& id : ids) slots.try_emplace(id, static_cast<uint32_t>(slots.size()));
+  return slots;
+}
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+}  // namespace
+
+CellTask make_cell_task(const Plan& plan, const Scene& scene, const PlannedCell& cell) {
+  CellTask task;
+  task.params = plan.params;
+  task.seed = hash_combine(plan.params.seed, static_cast<uint64_t>(static_cast<uint32_t>(cell.level)));
+  for (const int32_t i : cell.cell) task.seed = hash_combine(task.seed, static_cast<uint64_t>(static_cast<uint32_t>(i)));
+
+  // Objects by id.
+  std::map<Digest, uint32_t> object_of;
+  for (const uint32_t r : cell.receivers) {
+    const uint32_t o = plan.receivers.all[r].object;
+    object_of.try_emplace(scene.objects[o].id, o);
+  }
+  std::map<uint32_t, uint32_t> slot_of;
+  for (const auto& [id, o] : object_of) {
+    slot_of[o] = static_cast<uint32_t>(task.objects.size());
+    task.objects.push_back(chunk_object(plan, scene, o));
+  }
+
+  // Probes in the plan's order, which is that of their keys.
+  const auto& probes = plan.placement.probes;
+  const ProbeGrid grid(probes, plan.params.spacing);
+  std::vector<std::vector<ProbeGrid::Near>> near(cell.receivers.size());
+  std::vector<uint32_t> reachable;
+  for (size_t i = 0; i < cell.receivers.size(); ++i) {
+    near[i] = grid.nearest(plan.receivers.all[cell.receivers[i]].point.position, plan.params.links + kFallbacks);
+    for (const auto& n : near[i]) reachable.push_back(n.probe);
+  }
+  const auto probe_slot = enumerate(std::move(reachable));
+  for (const auto& [id, slot] : probe_slot) {
+    task.probe_ids.push_back(id);
+    task.probes.push_back(probes[id].position);
+  }
+
+  for (size_t i = 0; i < cell.receivers.size(); ++i) {
+    const Receiver& r = plan.receivers.all[cell.receivers[i]];
+    GatherPoint point;
+    point.point = r.point;
+    point.seed = hash_combine(r.seed, plan.params.seed);
+    for (const auto& n : near[i]) point.near.push_back(probe_slot.at(n.probe));
+    task.receivers.push_back(std::move(point));
+    task.texels.push_back({slot_of.at(r.object), r.key});
+  }
+  return task;
+}
+
+CellResult bake_cell(const RayTracer& tracer, const CellTask& task) {
+  const int J = sh_count(task.params.order);
+  const GatherOptions gather{task.params.order, task.params.links, task.params.rays};
+  CellResult out;
+
+  // Transport: one row α_x per receiver.
+  auto start = std::chrono::steady_clock::now();
+  Matrix transport = Matrix::Zero(static_cast<Eigen::Index>(task.receivers.size()),
+                                  static_cast<Eigen::Index>(task.probes.size()) * J);
+  std::vector<Vec3> positions;
+  for (size_t r = 0; r < task.receivers.size(); ++r) {
+    const std::span<float> row(transport.row(static_cast<Eigen::Index>(r)).data(), static_cast<size_t>(transport.cols()));
+    out.stats += gather_row(tracer, task.receivers[r], task.probes, gather, row);
+    positions.push_back(task.receivers[r].point.position);
+    out.bounds.extend(positions.back());
+  }
+  out.transport_seconds = seconds_since(start);
+
+  // Compression.
+  start = std::chrono::steady_clock::now();
+  CompressionOptions options;
+  options.order = task.params.order;
+  options.max_rank = task.params.max_rank;
+  options.threshold = task.params.threshold;
+  options.seed = task.seed;
+  CompressedCell compressed = compress_cell(transport, positions, options);
+  out.error = compressed.error;
+
+  // Keep the probes that are read.
+  std::vector<uint32_t> used;
+  for (const auto& cluster : compressed.clusters) used.insert(used.end(), cluster.probes.begin(), cluster.probes.end());
+  const auto slot = enumerate(std::move(used));
+  for (const auto& [probe, unused] : slot) out.probe_ids.push_back(task.probe_ids[probe]);
+  for (auto& cluster : compressed.clusters) {
+    for (uint32_t& p : cluster.probes) p = slot.at(p);
+  }
+
+  out.chunk.order = static_cast<uint32_t>(task.params.order);
+  out.chunk.probe_count = static_cast<uint32_t>(out.probe_ids.size());
+  out.chunk.objects = task.objects;
+  for (const uint32_t r : compressed.order) out.chunk.receivers.push_back(task.texels[r]);
+  out.chunk.uniform = std::move(compressed.uniform);
+  out.chunk.clusters = std::move(compressed.clusters);
+  out.compress_seconds = seconds_since(start);
+  return out;
+}
+
+RelightChunk bake_relight(const RayTracer& tracer, const Plan& plan, Vec3 probe) {
+  const Scene& scene = tracer.scene();
+  const uint32_t n = static_cast<uint32_t>(plan.params.relight_rays);
+  RelightChunk out;
+  out.position = probe;
+
+  // Texel per ray, then numbered by the objects that were hit.
+  std::vector<uint32_t> receiver(n, Receivers::kNone);
+  out.rays.assign(n, RelightChunk::kDead);
+  std::map<Digest, uint32_t> object_of;
+  for (uint32_t i = 0; i < n; ++i) {
+    const Hit hit = tracer.closest(probe, sphere_direction(i, n));
+    if (!hit) {
+      out.rays[i] = RelightChunk::kSky;
+      continue;
+    }
+    const Object& object = scene.objects[hit.object];
+    if (hit.back && !scene.materials[object.triangles[hit.triangle].material].double_sided) continue;
+    receiver[i] = plan.receivers.locate(plan.layout, hit);
+    if (receiver[i] != Receivers::kNone) object_of.try_emplace(object.id, hit.object);
+  }
+  std::map<uint32_t, uint32_t> base_of;
+  uint32_t base = 0;
+  for (const auto& [id, o] : object_of) {
+    base_of[o] = base;
+    out.objects.push_back(chunk_object(plan, scene, o));
+    base += 2 * out.objects.back().width * out.objects.back().height;
+  }
+  for (uint32_t i = 0; i < n; ++i) {
+    if (receiver[i] == Receivers::kNone) continue;
+    const Receiver& r = plan.receivers.all[receiver[i]];
+    out.rays[i] = base_of.at(r.object) + r.key;
+  }
+  return out;
+}
+
+SurfaceChunk make_surface(const Plan& plan, const Scene& scene, uint32_t object) {
+  SurfaceChunk out;
+  out.object = chunk_object(plan, scene, object);
+  for (uint32_t i = plan.receivers.first[object]; i < plan.receivers.first[object + 1]; ++i) {
+    const Receiver& r = plan.receivers.all[i];
+    const Texel& texel = plan.receivers.grids[object].texels[r.texel];
+    out.keys.push_back(r.key);
+    out.positions.push_back(interpolate(scene.objects[object].positions,
+                                        scene.objects[object].triangles[texel.triangle], texel.b1, texel.b2));
+    out.normals.push_back(r.point.normal);
+    out.areas.push_back(texel.area);
+  }
+  return out;
+}
+
+}  // namespace lightloom

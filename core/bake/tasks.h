@@ -1,0 +1,43 @@
+// The units of work of a bake. Each is a pure function of the scene and a plain struct: same bytes wherever, whenever
+// and however often it runs.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/asset/chunk.h"
+#include "core/bake/plan.h"
+#include "core/transport/gather.h"
+
+namespace lightloom {
+
+/// Receivers of one bake cell, and the probes in their reach.
+struct CellTask {
+  BakeParams params;
+  std::vector<ChunkObject> objects;
+  std::vector<TexelRef> texels;         ///< per receiver
+  std::vector<GatherPoint> receivers;   ///< `near` indexes `probes`
+  std::vector<Vec3> probes;
+  std::vector<uint32_t> probe_ids;      ///< the plan's index of each probe
+  uint64_t seed = 0;                    ///< of the cell's level and coordinates
+};
+
+struct CellResult {
+  CellChunk chunk;
+  std::vector<uint32_t> probe_ids;  ///< the cell's probe list: the plan's indices of probes that it reads
+  GatherStats stats;
+  double error = 0;
+  Aabb bounds;
+  double transport_seconds = 0, compress_seconds = 0;  ///< thread time; not part of the result's bytes
+};
+
+CellTask make_cell_task(const Plan& plan, const Scene& scene, const PlannedCell& cell);
+CellResult bake_cell(const RayTracer& tracer, const CellTask& task);
+
+/// What the probe sees along its relight rays, as texels of the plan's receivers.
+RelightChunk bake_relight(const RayTracer& tracer, const Plan& plan, Vec3 probe);
+
+/// The receivers of one object.
+SurfaceChunk make_surface(const Plan& plan, const Scene& scene, uint32_t object);
+
+}  // namespace lightloom
