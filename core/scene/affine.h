@@ -63,10 +63,12 @@ inline Transform inverse(const Transform& m) {
   return out;
 }
 
-/// Zero if `v` has no direction.
+/// Zero if `v` has no direction. What is unit up to float rounding stays bit for bit, so that saving a level and loading
+/// it again changes nothing.
 inline Vec3 unit(Dvec3 v) {
-  const double length = std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-  if (!(length > 0) || !std::isfinite(length)) return {};
+  const double square = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+  if (!(square > 0) || !std::isfinite(square)) return {};
+  const double length = std::abs(square - 1) < 3e-7 ? 1 : std::sqrt(square);
   return {static_cast<float>(v[0] / length), static_cast<float>(v[1] / length), static_cast<float>(v[2] / length)};
 }
 

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <map>
 #include <string>
 #include <utility>
 
@@ -15,6 +17,7 @@ namespace lightloom {
 /// Geometry in the node's space. Normals are zero where the file has no usable one.
 struct MeshReader::Local : Object {
   bool has_uv0 = false, has_uv1 = false, lacks_uv1 = false;
+  std::map<std::map<std::string, int>, uint32_t> bases;  // attributes → first vertex, for primitives that share them
 };
 
 namespace {
@@ -101,13 +104,6 @@ Defect defect(const std::array<Vec3, 3>& p) {
   return std::sqrt(x * x + y * y + z * z) > 1e-18 ? Defect::kNone : Defect::kNoArea;
 }
 
-/// Leaves normals that are unit up to rounding as they are, bit for bit, so that saving and loading changes nothing.
-Vec3 unit_unless_already(Dvec3 n) {
-  const double square = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
-  if (std::abs(square - 1) > 1e-6) return unit(n);
-  return {static_cast<float>(n[0]), static_cast<float>(n[1]), static_cast<float>(n[2])};
-}
-
 template <class T>
 void keep(const std::vector<uint32_t>& kept, std::vector<T>* values) {
   if (values->empty()) return;
@@ -133,6 +129,29 @@ uint32_t MeshReader::default_material() {
     scene_->materials.emplace_back().name = "default";
   }
   return static_cast<uint32_t>(default_material_);
+}
+
+absl::Status MeshReader::append_vertices(const tinygltf::Primitive& primitive, uint64_t count, const std::string& whose,
+                                         const std::string& object, Local* local) {
+  LL_ASSIGN_OR_RETURN(const std::vector<float> p, attribute(model_, primitive, "POSITION", 3, count, whose));
+  LL_ASSIGN_OR_RETURN(const std::vector<float> n, attribute(model_, primitive, "NORMAL", 3, count, whose));
+  LL_ASSIGN_OR_RETURN(const std::vector<float> uv0, attribute(model_, primitive, "TEXCOORD_0", 2, count, whose));
+  LL_ASSIGN_OR_RETURN(const std::vector<float> uv1, attribute(model_, primitive, "TEXCOORD_1", 2, count, whose));
+  const auto base = static_cast<std::ptrdiff_t>(local->positions.size());
+  for (uint64_t i = 0; i < count; ++i) local->positions.push_back({p[3 * i], p[3 * i + 1], p[3 * i + 2]});
+  append(n, count, &local->normals);
+  const uint64_t bad_uv = append(uv0, count, &local->uv0) + append(uv1, count, &local->uv1);
+  if (bad_uv > 0) warnings_->add("texture coordinates were not finite and became 0", object, bad_uv);
+  local->has_uv0 |= !uv0.empty();
+  local->has_uv1 |= !uv1.empty();
+  local->lacks_uv1 |= uv1.empty();
+  if (n.empty()) {
+    warnings_->add("primitives had no normals and got flat ones", object);
+    return absl::OkStatus();
+  }
+  const auto bad = static_cast<uint64_t>(std::count(local->normals.begin() + base, local->normals.end(), Vec3{}));
+  if (bad > 0) warnings_->add("normals were zero or not finite and became those of a face", object, bad);
+  return absl::OkStatus();
 }
 
 absl::Status MeshReader::append_primitive(int mesh, size_t index, const std::string& object, Local* local) {
@@ -167,10 +186,6 @@ absl::Status MeshReader::append_primitive(int mesh, size_t index, const std::str
                                         " triangles or " + std::to_string(kMaxElements) + " vertices; split it");
   }
 
-  LL_ASSIGN_OR_RETURN(const std::vector<float> p, attribute(model_, primitive, "POSITION", 3, vertices, whose));
-  LL_ASSIGN_OR_RETURN(const std::vector<float> n, attribute(model_, primitive, "NORMAL", 3, vertices, whose));
-  LL_ASSIGN_OR_RETURN(const std::vector<float> uv0, attribute(model_, primitive, "TEXCOORD_0", 2, vertices, whose));
-  LL_ASSIGN_OR_RETURN(const std::vector<float> uv1, attribute(model_, primitive, "TEXCOORD_1", 2, vertices, whose));
   std::vector<uint32_t> indices;
   if (primitive.indices >= 0) {
     LL_ASSIGN_OR_RETURN(indices, read_indices(model_, primitive.indices));
@@ -185,20 +200,10 @@ absl::Status MeshReader::append_primitive(int mesh, size_t index, const std::str
   LL_ASSIGN_OR_RETURN(auto triples, corners(indices, primitive.mode, whose));
   if (triples.empty()) return absl::OkStatus();
 
-  const auto base = static_cast<uint32_t>(local->positions.size());
-  for (uint64_t i = 0; i < vertices; ++i) local->positions.push_back({p[3 * i], p[3 * i + 1], p[3 * i + 2]});
-  append(n, vertices, &local->normals);
-  const uint64_t bad_uv = append(uv0, vertices, &local->uv0) + append(uv1, vertices, &local->uv1);
-  if (bad_uv > 0) warnings_->add("texture coordinates were not finite and became 0", object, bad_uv);
-  local->has_uv0 |= !uv0.empty();
-  local->has_uv1 |= !uv1.empty();
-  local->lacks_uv1 |= uv1.empty();
-  if (has_normals) {
-    const auto bad = std::count(local->normals.begin() + base, local->normals.end(), Vec3{});
-    if (bad > 0) warnings_->add("normals were zero or not finite and became those of a face", object, static_cast<uint64_t>(bad));
-  } else {
-    warnings_->add("primitives had no normals and got flat ones", object);
-  }
+  const auto [shared, is_new] =
+      local->bases.emplace(primitive.attributes, static_cast<uint32_t>(local->positions.size()));
+  const uint32_t base = shared->second;
+  if (is_new) LL_RETURN_IF_ERROR(append_vertices(primitive, vertices, whose, object, local));
 
   const uint32_t material = primitive.material >= 0 ? static_cast<uint32_t>(primitive.material) : default_material();
   const auto duplicate = [&](uint32_t v) {  // a corner of its own, so that its normal can be the face's
@@ -278,7 +283,7 @@ absl::Status MeshReader::read(int mesh, Object* object) {
     for (size_t row = 0; row < 3; ++row) {
       turned[row] = sign * (c[row] * n.x + c[3 + row] * n.y + c[6 + row] * n.z);
     }
-    object->normals.push_back(unit_unless_already(turned));
+    object->normals.push_back(unit(turned));
   }
   object->positions = std::move(world);
   object->triangles = std::move(local.triangles);

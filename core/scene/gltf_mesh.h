@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 
 #include "core/base/status.h"
 #include "core/scene/gltf_accessor.h"
@@ -11,6 +12,7 @@
 
 namespace tinygltf {
 class Model;
+struct Primitive;
 }
 
 namespace lightloom {
@@ -28,6 +30,8 @@ class MeshReader {
 
  private:
   struct Local;
+  absl::Status append_vertices(const tinygltf::Primitive& primitive, uint64_t count, const std::string& whose,
+                               const std::string& object, Local* local);
   absl::Status append_primitive(int mesh, size_t primitive, const std::string& object, Local* local);
   uint32_t default_material();
 
