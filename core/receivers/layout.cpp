@@ -13,8 +13,8 @@
 namespace lightloom {
 namespace {
 
-constexpr int kMaxSide = 8192;         // of one object's lightmap or a scene atlas
-constexpr int kMaxImageSide = 16384;   // of all objects' lightmaps together
+constexpr int kMaxSide = 8192;        // of one object's lightmap or a scene atlas
+constexpr int kMaxImageSide = 16384;  // of all objects' lightmaps together
 constexpr double kDefaultTexels = 65536;
 
 bool receives_lightmap(const Object& object) {
@@ -43,8 +43,8 @@ double round_coarsely(double value) {
 
 absl::Status check_arguments(const Scene& scene, const LayoutOptions& options) {
   if (options.lightmap_size < 0 || options.lightmap_size > kMaxSide) {
-    return absl::InvalidArgumentError(absl::StrCat("lightmap size ", options.lightmap_size,
-                                                   " is out of range; it must be 1 to ", kMaxSide, " texels"));
+    return absl::InvalidArgumentError(absl::StrCat(
+        "lightmap size ", options.lightmap_size, " is out of range; it must be 1 to ", kMaxSide, " texels"));
   }
   if (!(options.texels_per_metre >= 0) || !std::isfinite(options.texels_per_metre)) {
     return absl::InvalidArgumentError(
@@ -90,11 +90,13 @@ int scene_atlas_side(const Scene& scene, double texels_per_metre) {
 }
 
 /// The layout of mode kScene, or nothing if the objects' TEXCOORD_1 is no common atlas.
-std::optional<AtlasLayout> scene_layout(const Scene& scene, const LayoutOptions& options, double texels_per_metre) {
+std::optional<AtlasLayout> scene_layout(const Scene& scene, const LayoutOptions& options,
+                                        double texels_per_metre) {
   for (const Object& object : scene.objects) {
     if (receives_lightmap(object) && !(has_unit_uv1(object) && uv1_area(object) > 0)) return std::nullopt;
   }
-  const int side = options.lightmap_size > 0 ? options.lightmap_size : scene_atlas_side(scene, texels_per_metre);
+  const int side =
+      options.lightmap_size > 0 ? options.lightmap_size : scene_atlas_side(scene, texels_per_metre);
   AtlasLayout layout;
   layout.mode = LayoutMode::kScene;
   layout.width = layout.height = side;
@@ -120,7 +122,8 @@ Vec2 metres_per_uv(const Object& object) {
     const Vec3 q = object.positions[t.v[2]] - object.positions[t.v[0]];
     const float determinant = e.x * f.y - f.x * e.y;
     const double weight = triangle_area(object, t);
-    const double du = length((p * f.y - q * e.y) / determinant), dv = length((q * e.x - p * f.x) / determinant);
+    const double du = length((p * f.y - q * e.y) / determinant),
+                 dv = length((q * e.x - p * f.x) / determinant);
     if (!std::isfinite(weight * du) || !std::isfinite(weight * dv)) continue;
     along_u += weight * du;
     along_v += weight * dv;
@@ -129,8 +132,8 @@ Vec2 metres_per_uv(const Object& object) {
   return area > 0 ? Vec2{static_cast<float>(along_u / area), static_cast<float>(along_v / area)} : Vec2{};
 }
 
-/// The object's own TEXCOORD_1 at the wanted density, cropped to what it uses; nothing if it is missing, overlaps
-/// itself, or wastes so much of [0,1]² that the image would be too large.
+/// The object's own TEXCOORD_1 at the wanted density, cropped to what it uses; nothing if it is missing,
+/// overlaps itself, or wastes so much of [0,1]² that the image would be too large.
 std::optional<LightmapUv> own_uv1(const Object& object, double texels_per_metre) {
   if (!has_unit_uv1(object)) return std::nullopt;
   const double uv_area = uv1_area(object);
@@ -142,7 +145,8 @@ std::optional<LightmapUv> own_uv1(const Object& object, double texels_per_metre)
   const double aspect = double{metres.x} / metres.y;
   const double width = std::ceil(std::sqrt(wanted * aspect)), height = std::ceil(std::sqrt(wanted / aspect));
   if (!(width <= kMaxSide && height <= kMaxSide)) return std::nullopt;
-  LightmapUv uv = scaled_uv1(object, std::max(1, static_cast<int>(width)), std::max(1, static_cast<int>(height)));
+  LightmapUv uv =
+      scaled_uv1(object, std::max(1, static_cast<int>(width)), std::max(1, static_cast<int>(height)));
 
   Vec2 lo = uv.corners[0][0], hi = lo;
   for (const auto& corners : uv.corners) {
