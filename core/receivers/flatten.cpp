@@ -261,9 +261,11 @@ void shift_onto_centre(FlatChart* chart) {
 
 /// Gives a chart that lies between texel centres one of them: without it, it would receive nothing.
 void cover_a_centre(const std::vector<FlatTriangle>& flat, FlatChart* chart) {
+  // Between two triangles a centre on the edge is well covered, at the border of one it is not.
+  const int32_t margin = chart->corners.size() == 1 ? 1 : 0;
   bool covered = false;
   for (size_t i = 0; i < chart->corners.size() && !covered; ++i) {
-    rasterise(chart->corners[i], {}, 0, [&](int, int, int) {
+    rasterise(chart->corners[i], {}, margin, [&](int, int, int) {
       covered = true;
       return false;
     });

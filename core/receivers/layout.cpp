@@ -77,8 +77,9 @@ double choose_density(const Scene& scene, const LayoutOptions& options) {
   return area > 0 && std::isfinite(area) ? round_coarsely(std::sqrt(texels / area)) : 1;
 }
 
-/// Side of a scene atlas in which objects have the wanted density on average: a multiple of 64.
-int scene_atlas_side(const Scene& scene, double texels_per_metre) {
+/// Side of a scene atlas in which objects have the wanted density on average: a multiple of 64, maybe too
+/// large.
+double scene_atlas_side(const Scene& scene, double texels_per_metre) {
   double texels = 0, uv_area = 0;
   for (const Object& object : scene.objects) {
     if (!receives_lightmap(object)) continue;
@@ -86,17 +87,23 @@ int scene_atlas_side(const Scene& scene, double texels_per_metre) {
     uv_area += uv1_area(object);
   }
   const double side = uv_area > 0 ? std::sqrt(texels / uv_area) : 64;
-  return static_cast<int>(std::clamp(64 * std::ceil(side / 64), 64.0, double{kMaxSide}));
+  return std::max(64.0, 64 * std::ceil(side / 64));
 }
 
 /// The layout of mode kScene, or nothing if the objects' TEXCOORD_1 is no common atlas.
-std::optional<AtlasLayout> scene_layout(const Scene& scene, const LayoutOptions& options,
-                                        double texels_per_metre) {
+absl::StatusOr<std::optional<AtlasLayout>> scene_layout(const Scene& scene, const LayoutOptions& options,
+                                                        double texels_per_metre) {
   for (const Object& object : scene.objects) {
     if (receives_lightmap(object) && !(has_unit_uv1(object) && uv1_area(object) > 0)) return std::nullopt;
   }
-  const int side =
+  const double wanted =
       options.lightmap_size > 0 ? options.lightmap_size : scene_atlas_side(scene, texels_per_metre);
+  if (!(wanted <= kMaxSide)) {
+    return absl::InvalidArgumentError(absl::StrCat("the scene's atlas would be ", wanted,
+                                                   " texels wide, over ", kMaxSide,
+                                                   "; lower the texels per metre"));
+  }
+  const int side = static_cast<int>(wanted);
   AtlasLayout layout;
   layout.mode = LayoutMode::kScene;
   layout.width = layout.height = side;
@@ -109,7 +116,7 @@ std::optional<AtlasLayout> scene_layout(const Scene& scene, const LayoutOptions&
     claims.claim(layout.uv[i], static_cast<uint32_t>(i));
   }
   if (!claims.disjoint()) return std::nullopt;
-  return layout;
+  return std::optional(std::move(layout));
 }
 
 /// Metres per unit of u and of v, averaged over the surface: the lengths of dp/du and dp/dv.
@@ -201,6 +208,7 @@ absl::StatusOr<AtlasLayout> per_object_layout(const Scene& scene, const LayoutOp
 absl::StatusOr<AtlasLayout> make_layout(const Scene& scene, const LayoutOptions& options) {
   LL_RETURN_IF_ERROR(check_arguments(scene, options));
   const double texels_per_metre = choose_density(scene, options);
+  std::optional<AtlasLayout> common;
   AtlasLayout layout;
   if (std::none_of(scene.objects.begin(), scene.objects.end(), receives_lightmap)) {
     layout.mode = LayoutMode::kPerObject;
@@ -208,11 +216,15 @@ absl::StatusOr<AtlasLayout> make_layout(const Scene& scene, const LayoutOptions&
     layout.height = options.earlier_height;
     layout.uv.resize(scene.objects.size());
     layout.placements.resize(scene.objects.size());
-  } else if (std::optional<AtlasLayout> common;
-             options.earlier_width <= 0 && (common = scene_layout(scene, options, texels_per_metre))) {
-    layout = *std::move(common);
   } else {
-    LL_ASSIGN_OR_RETURN(layout, per_object_layout(scene, options, texels_per_metre));
+    if (options.earlier_width <= 0) {
+      LL_ASSIGN_OR_RETURN(common, scene_layout(scene, options, texels_per_metre));
+    }
+    if (common) {
+      layout = *std::move(common);
+    } else {
+      LL_ASSIGN_OR_RETURN(layout, per_object_layout(scene, options, texels_per_metre));
+    }
   }
   layout.texels_per_metre = static_cast<float>(texels_per_metre);
   return layout;

@@ -63,14 +63,16 @@ std::optional<Packing> pack_near_square(std::span<const RectSize> sizes, int gut
   const int tries =
       static_cast<int>(std::clamp<int64_t>(200'000 / std::max<int64_t>(1, std::ssize(sizes)), 1, 64));
   std::optional<Packing> best;
+  // The area, a little more for what is far from square.
   const auto score = [](const Packing& p) {
-    const bool long_and_thin = std::max(p.width, p.height) >= 2 * std::min(p.width, p.height);
-    return std::pair(long_and_thin, int64_t{p.width} * p.height);
+    const int64_t w = p.width, h = p.height;
+    const bool long_and_thin = std::max(w, h) >= 4 * std::min(w, h);
+    return std::pair(long_and_thin, 25 * w * h + (w - h) * (w - h));
   };
   int previous = 0;
   for (int i = 0; i < tries; ++i) {
     const int width =
-        std::min(max_size, std::max(widest, static_cast<int>(side * (0.75 + 0.65 * (i + 0.5) / tries))));
+        std::min(max_size, std::max(widest, static_cast<int>(side * (0.6 + 1.2 * (i + 0.5) / tries))));
     if (width == previous) continue;
     previous = width;
     std::optional<Packing> packing = pack_strip(sizes, gutter, width, max_size);

@@ -23,7 +23,7 @@ struct Packing {
 /// or the image would be higher than max_height.
 std::optional<Packing> pack_strip(std::span<const RectSize> sizes, int gutter, int width, int max_height);
 
-/// Into the smallest image found whose sides differ by a factor below two, unless one rectangle forces more.
+/// Into the smallest image found whose sides differ by a factor below four, unless one rectangle forces more.
 /// Nothing if a side would exceed max_size.
 std::optional<Packing> pack_near_square(std::span<const RectSize> sizes, int gutter, int max_size);
 
