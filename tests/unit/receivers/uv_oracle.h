@@ -77,7 +77,7 @@ inline std::vector<int> islands(const Object& object, const LightmapUv& uv) {
         const Vec3 p = object.positions[object.triangles[t].v[k]];
         return Corner{p.x, p.y, p.z, uv.corners[t][k].x, uv.corners[t][k].y};
       };
-      const auto ends = std::minmax(corner(e), corner((e + 1) % 3));
+      const auto ends = std::minmax({corner(e), corner((e + 1) % 3)});
       const auto [it, added] = edges.try_emplace({ends.first, ends.second}, static_cast<int>(t));
       if (!added) parent[static_cast<size_t>(root(static_cast<int>(t)))] = root(it->second);
     }
