@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "core/receivers/charts.h"
 #include "core/receivers/flatten.h"
@@ -52,6 +53,7 @@ float utilisation(const LightmapUv& uv, const std::vector<FlatChart>& charts,
           std::fill(row + std::max(0, positions[c].x + first - gutter),
                     row + std::min(uv.width, positions[c].x + last + gutter + 1), true);
         }
+        return true;
       });
     }
   }
@@ -61,10 +63,22 @@ float utilisation(const LightmapUv& uv, const std::vector<FlatChart>& charts,
 
 }  // namespace
 
-absl::StatusOr<LightmapUv> generate_atlas(const Object& object, const AtlasOptions& options, AtlasStats* stats) {
+absl::StatusOr<LightmapUv> generate_atlas(const Object& object, const AtlasOptions& options,
+                                          AtlasStats* stats) {
   const double texels_per_metre = double{options.texels_per_metre} * object.texel_scale;
   LL_RETURN_IF_ERROR(check_arguments(object, options, texels_per_metre));
   const MeshTopology mesh = build_topology(object);
+  const auto too_large = [&] {
+    return absl::InvalidArgumentError(absl::StrCat("object '", object.name, "': its lightmap does not fit ",
+                                                   options.max_size, " x ", options.max_size,
+                                                   " texels; lower the texels per metre or its texel scale"));
+  };
+  const double texels =
+      std::accumulate(mesh.area.begin(), mesh.area.end(), 0.0) * texels_per_metre * texels_per_metre;
+  // Projection shrinks areas by max_angle_cos at most, rounding to whole texels narrows a side by a third at
+  // most.
+  if (!(texels * options.max_angle_cos * 4 / 9 <= double{1} * options.max_size * options.max_size))
+    return too_large();
   LL_ASSIGN_OR_RETURN(const std::vector<FlatChart> charts,
                       flatten_charts(object, mesh, grow_charts(mesh, options.max_angle_cos), texels_per_metre,
                                      options.max_size));
@@ -74,11 +88,7 @@ absl::StatusOr<LightmapUv> generate_atlas(const Object& object, const AtlasOptio
   if (sizes.empty()) sizes.push_back({1, 1});  // nothing but degenerate triangles: a place for them
   const int border = 2 * options.gutter;
   const std::optional<Packing> packing = pack_near_square(sizes, options.gutter, options.max_size - border);
-  if (!packing) {
-    return absl::InvalidArgumentError(absl::StrCat("object '", object.name, "': its lightmap does not fit ",
-                                                   options.max_size, " x ", options.max_size,
-                                                   " texels; lower the texels per metre or its texel scale"));
-  }
+  if (!packing) return too_large();
   std::vector<RectPosition> positions = packing->positions;
   for (RectPosition& p : positions) p = {p.x + options.gutter, p.y + options.gutter};
 
@@ -90,9 +100,8 @@ absl::StatusOr<LightmapUv> generate_atlas(const Object& object, const AtlasOptio
     for (size_t i = 0; i < charts[c].triangles.size(); ++i) {
       for (size_t k = 0; k < 3; ++k) {
         const GridPoint p = charts[c].corners[i][k];
-        uv.corners[charts[c].triangles[i]][k] = {
-            static_cast<float>(positions[c].x * kGrid + p.x) / kGrid,
-            static_cast<float>(positions[c].y * kGrid + p.y) / kGrid};
+        uv.corners[charts[c].triangles[i]][k] = {static_cast<float>(positions[c].x * kGrid + p.x) / kGrid,
+                                                 static_cast<float>(positions[c].y * kGrid + p.y) / kGrid};
       }
     }
   }

@@ -1,8 +1,8 @@
 // Lightmap parametrisation of one object that brings no TEXCOORD_1.
 //
-// Charts grow over edge-adjacent triangles while their normals agree, are laid flat by projection, split where the
-// projection overlaps itself, and are packed by stb_rect_pack. Depends on the object's triangles and the texel density
-// only, never on other objects.
+// Charts grow over edge-adjacent triangles while their normals agree, are laid flat by projection, split
+// where the projection overlaps itself, and are packed by stb_rect_pack. Depends on the object's triangles
+// and the texel density only, never on other objects.
 #pragma once
 
 #include <array>
@@ -23,9 +23,9 @@ struct LightmapUv {
 
 struct AtlasOptions {
   float texels_per_metre = 8;
-  int gutter = 1;            ///< texels between any two charts, and around the border
+  int gutter = 1;              ///< texels between any two charts, and around the border
   float max_angle_cos = 0.7f;  ///< a chart's triangles keep dot(normal, chart normal) above this
-  int max_size = 8192;       ///< error above this side length
+  int max_size = 8192;         ///< error above this side length
 };
 
 struct AtlasStats {

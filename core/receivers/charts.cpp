@@ -1,6 +1,6 @@
-// Region growing by normal as in Lévy, Petitjean, Ray & Maillot, "Least Squares Conformal Maps", SIGGRAPH 2002, section
-// 3, reduced to planar proxies: one step of the relaxation of Cohen-Steiner, Alliez & Desbrun, "Variational Shape
-// Approximation", SIGGRAPH 2004, turns the seed's normal into that of its surroundings.
+// Region growing by normal as in Lévy, Petitjean, Ray & Maillot, "Least Squares Conformal Maps", SIGGRAPH
+// 2002, section 3, reduced to planar proxies: one step of the relaxation of Cohen-Steiner, Alliez & Desbrun,
+// "Variational Shape Approximation", SIGGRAPH 2004, turns the seed's normal into that of its surroundings.
 #include "core/receivers/charts.h"
 
 #include <algorithm>
@@ -10,8 +10,8 @@
 namespace lightloom {
 namespace {
 
-// How far the surroundings are explored for the axis. Bounds the work on meshes where little of what was explored can
-// be kept.
+// How far the surroundings are explored for the axis. Bounds the work on meshes where little of what was
+// explored can be kept.
 constexpr size_t kSurroundings = 4096;
 
 /// Breadth-first growth from a seed over unassigned triangles.
@@ -19,7 +19,8 @@ class Grower {
  public:
   explicit Grower(const MeshTopology& mesh) : mesh_(mesh), seen_(mesh.area.size(), 0) {}
 
-  std::vector<uint32_t> grow(uint32_t seed, Vec3 axis, float min_cos, size_t limit, const std::vector<bool>& taken) {
+  std::vector<uint32_t> grow(uint32_t seed, Vec3 axis, float min_cos, size_t limit,
+                             const std::vector<bool>& taken) {
     ++round_;
     std::vector<uint32_t> reached{seed};
     seen_[seed] = round_;
@@ -58,7 +59,8 @@ std::vector<Chart> grow_charts(const MeshTopology& mesh, float max_angle_cos) {
   std::vector<uint32_t> seeds(mesh.area.size());
   std::iota(seeds.begin(), seeds.end(), 0u);
   std::erase_if(seeds, [&](uint32_t t) { return mesh.degenerate(t); });
-  std::stable_sort(seeds.begin(), seeds.end(), [&](uint32_t a, uint32_t b) { return mesh.area[a] > mesh.area[b]; });
+  std::stable_sort(seeds.begin(), seeds.end(),
+                   [&](uint32_t a, uint32_t b) { return mesh.area[a] > mesh.area[b]; });
 
   std::vector<Chart> charts;
   std::vector<bool> taken(mesh.area.size(), false);

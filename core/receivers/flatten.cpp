@@ -1,6 +1,6 @@
-// The smallest rectangle around a convex polygon has a side along one of its edges: Freeman & Shapira, "Determining the
-// Minimum-Area Encasing Rectangle for an Arbitrary Closed Curve", CACM 18(7), 1975. Convex hull: Andrew, "Another
-// Efficient Algorithm for Convex Hulls in Two Dimensions", IPL 9(5), 1979.
+// The smallest rectangle around a convex polygon has a side along one of its edges: Freeman & Shapira,
+// "Determining the Minimum-Area Encasing Rectangle for an Arbitrary Closed Curve", CACM 18(7), 1975. Convex
+// hull: Andrew, "Another Efficient Algorithm for Convex Hulls in Two Dimensions", IPL 9(5), 1979.
 #include "core/receivers/flatten.h"
 
 #include <absl/strings/str_cat.h>
@@ -16,9 +16,9 @@ namespace {
 // Charts that fill less of their rectangle are worth a seam, if the cut saves this much.
 constexpr double kPoorFill = 0.55, kWorthwhile = 0.8;
 constexpr double kSmallRectangle = 64;  // texels; smaller ones are left whole
-// Work limit, in visits per triangle. Beyond it, what is left becomes one chart per triangle: only meshes made of
-// hundreds of coincident layers get there.
-constexpr uint64_t kVisits = 64;
+// Work limit, in visits per triangle. Beyond it, what is left becomes one chart per triangle: only meshes
+// made of hundreds of coincident layers get there.
+constexpr uint64_t kVisits = 32;
 
 struct Point {
   double x = 0, y = 0;
@@ -79,7 +79,8 @@ std::vector<Point> convex_hull(const std::vector<FlatTriangle>& flat) {
   return hull;
 }
 
-/// Turns the chart so that its smallest rectangle is upright and wider than high, and moves that to the origin.
+/// Turns the chart so that its smallest rectangle is upright and wider than high, and moves that to the
+/// origin.
 Box stand_upright(std::vector<FlatTriangle>* flat) {
   const std::vector<Point> hull = convex_hull(*flat);
   const size_t stride = 1 + hull.size() / 256;  // a hull this round has no edge that matters
@@ -112,7 +113,8 @@ Box stand_upright(std::vector<FlatTriangle>* flat) {
   return {{0, 0}, {box.width(), box.height()}};
 }
 
-/// Which triangles lie beyond the straight cut that leaves the smallest two rectangles; empty if no cut is worth it.
+/// Which triangles lie beyond the straight cut that leaves the smallest two rectangles; empty if no cut is
+/// worth it.
 std::vector<bool> find_cut(const std::vector<FlatTriangle>& flat, const Box& box) {
   double area = 0;
   for (const FlatTriangle& t : flat) area += 0.5 * std::abs(cross(t[0], t[1], t[2]));
@@ -146,7 +148,8 @@ std::vector<bool> find_cut(const std::vector<FlatTriangle>& flat, const Box& box
 
 int32_t to_grid(double texels) { return static_cast<int32_t>(std::floor(texels * kGrid + 0.5)); }
 
-/// Stretches the rectangle to whole texels and rounds corners to the grid. A flat rectangle fills its texels whole.
+/// Stretches the rectangle to whole texels and rounds corners to the grid. A flat rectangle fills its texels
+/// whole.
 void snap(const std::vector<FlatTriangle>& flat, const Box& box, FlatChart* chart) {
   const auto whole = [](double extent) { return std::max(1.0, std::floor(extent + 0.5)); };
   const double w = whole(box.width()), h = whole(box.height());
@@ -162,9 +165,9 @@ void snap(const std::vector<FlatTriangle>& flat, const Box& box, FlatChart* char
   }
 }
 
-/// Removes triangles that overlap an earlier one of the chart and returns them, in order. Samples lie finer than
-/// texels, texel centres among them; those within a hair of an edge are left out so that rounded T-junctions are not
-/// taken for overlap.
+/// Removes triangles that overlap an earlier one of the chart and returns them, in order. Samples lie finer
+/// than texels, texel centres among them; those within a hair of an edge are left out so that rounded
+/// T-junctions are not taken for overlap.
 std::vector<uint32_t> remove_overlap(FlatChart* chart) {
   int32_t fineness = 4;
   const auto columns = [&] { return static_cast<size_t>(chart->width * fineness + 1); };
@@ -174,13 +177,16 @@ std::vector<uint32_t> remove_overlap(FlatChart* chart) {
   constexpr int32_t kHair = kGrid / 64;
 
   std::vector<bool> owned(columns() * rows());
-  const auto sample = [&](int j, int i) { return static_cast<size_t>(j) * columns() + static_cast<size_t>(i); };
+  const auto sample = [&](int j, int i) {
+    return static_cast<size_t>(j) * columns() + static_cast<size_t>(i);
+  };
   std::vector<uint32_t> removed;
   size_t kept = 0;
   for (size_t n = 0; n < chart->triangles.size(); ++n) {
     bool free = true;
     rasterise(chart->corners[n], lattice, kHair, [&](int j, int first, int last) {
       for (int i = first; free && i <= last; ++i) free = !owned[sample(j, i)];
+      return free;
     });
     if (!free) {
       removed.push_back(chart->triangles[n]);
@@ -188,6 +194,7 @@ std::vector<uint32_t> remove_overlap(FlatChart* chart) {
     }
     rasterise(chart->corners[n], lattice, kHair, [&](int j, int first, int last) {
       for (int i = first; i <= last; ++i) owned[sample(j, i)] = true;
+      return true;
     });
     chart->triangles[kept] = chart->triangles[n];
     chart->corners[kept++] = chart->corners[n];
@@ -214,20 +221,14 @@ void crop(FlatChart* chart) {
   chart->height = std::max(1, (hi.y - shift.y + kGrid - 1) / kGrid);
 }
 
-/// A chart of one texel whose triangles miss the texel's centre is moved so that the largest one holds it: a texel
-/// that no triangle covers would receive nothing.
-void cover_a_centre(const std::vector<FlatTriangle>& flat, FlatChart* chart) {
-  if (chart->width != 1 || chart->height != 1 || flat.size() != chart->triangles.size()) return;
-  bool covered = false;
-  for (const GridTriangle& t : chart->corners) {
-    rasterise(t, {}, 0, [&](int, int, int) { covered = true; });
-  }
-  if (covered) return;
-
+/// Maps a chart of one texel so that its largest triangle holds the texel's centre and all stays within the
+/// texel.
+void centre_in_texel(const std::vector<FlatTriangle>& flat, FlatChart* chart) {
   const auto area = [](const FlatTriangle& t) { return std::abs(cross(t[0], t[1], t[2])); };
-  const FlatTriangle largest =
-      *std::max_element(flat.begin(), flat.end(), [&](const auto& a, const auto& b) { return area(a) < area(b); });
-  const Point c{(largest[0].x + largest[1].x + largest[2].x) / 3, (largest[0].y + largest[1].y + largest[2].y) / 3};
+  const FlatTriangle largest = *std::max_element(
+      flat.begin(), flat.end(), [&](const auto& a, const auto& b) { return area(a) < area(b); });
+  const Point c{(largest[0].x + largest[1].x + largest[2].x) / 3,
+                (largest[0].y + largest[1].y + largest[2].y) / 3};
   double rx = 0, ry = 0;
   for (const FlatTriangle& t : flat) {
     for (const Point& p : t) {
@@ -241,6 +242,40 @@ void cover_a_centre(const std::vector<FlatTriangle>& flat, FlatChart* chart) {
       chart->corners[i][k] = {to_grid(0.5 + 0.5 * (flat[i][k].x - c.x) / rx),
                               to_grid(0.5 + 0.5 * (flat[i][k].y - c.y) / ry)};
     }
+  }
+}
+
+/// Moves a chart by less than a texel so that its largest triangle holds a texel centre.
+void shift_onto_centre(FlatChart* chart) {
+  const GridTriangle largest = *std::max_element(chart->corners.begin(), chart->corners.end(),
+                                                 [](const GridTriangle& a, const GridTriangle& b) {
+                                                   return std::abs(twice_area(a)) < std::abs(twice_area(b));
+                                                 });
+  const auto to_centre = [](int32_t sum) { return (kGrid + kGrid / 2 - (sum / 3) % kGrid) % kGrid; };
+  const GridPoint shift{to_centre(largest[0].x + largest[1].x + largest[2].x),
+                        to_centre(largest[0].y + largest[1].y + largest[2].y)};
+  for (GridTriangle& t : chart->corners) {
+    for (GridPoint& p : t) p = {p.x + shift.x, p.y + shift.y};
+  }
+}
+
+/// Gives a chart that lies between texel centres one of them: without it, it would receive nothing.
+void cover_a_centre(const std::vector<FlatTriangle>& flat, FlatChart* chart) {
+  // Between two triangles a centre on the edge is well covered, at the border of one it is not.
+  const int32_t margin = chart->corners.size() == 1 ? 1 : 0;
+  bool covered = false;
+  for (size_t i = 0; i < chart->corners.size() && !covered; ++i) {
+    rasterise(chart->corners[i], {}, margin, [&](int, int, int) {
+      covered = true;
+      return false;
+    });
+  }
+  if (covered) return;
+  if (chart->width == 1 && chart->height == 1 && flat.size() == chart->triangles.size()) {
+    centre_in_texel(flat, chart);
+  } else {
+    shift_onto_centre(chart);
+    crop(chart);
   }
 }
 
@@ -271,9 +306,9 @@ absl::StatusOr<std::vector<FlatChart>> flatten_charts(const Object& object, cons
     std::vector<FlatTriangle> flat = project(object, chart, texels_per_metre);
     const Box box = stand_upright(&flat);
     if (!(std::max(box.width(), box.height()) <= max_size)) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("object '", object.name, "': a lightmap chart would be ", box.width(), " texels long, over ",
-                       max_size, "; lower the texels per metre or the object's texel scale"));
+      return absl::InvalidArgumentError(absl::StrCat(
+          "object '", object.name, "': a lightmap chart would be ", box.width(), " texels long, over ",
+          max_size, "; lower the texels per metre or the object's texel scale"));
     }
     if (const std::vector<bool> cut = find_cut(flat, box); !cut.empty()) {
       std::vector<uint32_t> near, far;

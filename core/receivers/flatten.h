@@ -17,9 +17,9 @@ struct FlatChart {
   int width = 0, height = 0;          ///< whole texels, at least 1
 };
 
-/// Projects each chart along its axis to scale, turns it into its smallest rectangle, wider than high, and rounds that
-/// to whole texels. Charts that fill little of their rectangle are cut, those that overlap themselves are split: more
-/// charts may come out than went in. Error if one is larger than max_size texels.
+/// Projects each chart along its axis to scale, turns it into its smallest rectangle, wider than high, and
+/// rounds that to whole texels. Charts that fill little of their rectangle are cut, those that overlap
+/// themselves are split: more charts may come out than went in. Error if one is larger than max_size texels.
 absl::StatusOr<std::vector<FlatChart>> flatten_charts(const Object& object, const MeshTopology& mesh,
                                                       std::vector<Chart> charts, double texels_per_metre,
                                                       int max_size);

@@ -13,8 +13,8 @@
 namespace lightloom {
 namespace {
 
-constexpr int kMaxSide = 8192;         // of one object's lightmap or a scene atlas
-constexpr int kMaxImageSide = 16384;   // of all objects' lightmaps together
+constexpr int kMaxSide = 8192;        // of one object's lightmap or a scene atlas
+constexpr int kMaxImageSide = 16384;  // of all objects' lightmaps together
 constexpr double kDefaultTexels = 65536;
 
 bool receives_lightmap(const Object& object) {
@@ -43,8 +43,8 @@ double round_coarsely(double value) {
 
 absl::Status check_arguments(const Scene& scene, const LayoutOptions& options) {
   if (options.lightmap_size < 0 || options.lightmap_size > kMaxSide) {
-    return absl::InvalidArgumentError(absl::StrCat("lightmap size ", options.lightmap_size,
-                                                   " is out of range; it must be 1 to ", kMaxSide, " texels"));
+    return absl::InvalidArgumentError(absl::StrCat(
+        "lightmap size ", options.lightmap_size, " is out of range; it must be 1 to ", kMaxSide, " texels"));
   }
   if (!(options.texels_per_metre >= 0) || !std::isfinite(options.texels_per_metre)) {
     return absl::InvalidArgumentError(
@@ -77,8 +77,9 @@ double choose_density(const Scene& scene, const LayoutOptions& options) {
   return area > 0 && std::isfinite(area) ? round_coarsely(std::sqrt(texels / area)) : 1;
 }
 
-/// Side of a scene atlas in which objects have the wanted density on average: a multiple of 64.
-int scene_atlas_side(const Scene& scene, double texels_per_metre) {
+/// Side of a scene atlas in which objects have the wanted density on average: a multiple of 64, maybe too
+/// large.
+double scene_atlas_side(const Scene& scene, double texels_per_metre) {
   double texels = 0, uv_area = 0;
   for (const Object& object : scene.objects) {
     if (!receives_lightmap(object)) continue;
@@ -86,15 +87,23 @@ int scene_atlas_side(const Scene& scene, double texels_per_metre) {
     uv_area += uv1_area(object);
   }
   const double side = uv_area > 0 ? std::sqrt(texels / uv_area) : 64;
-  return static_cast<int>(std::clamp(64 * std::ceil(side / 64), 64.0, double{kMaxSide}));
+  return std::max(64.0, 64 * std::ceil(side / 64));
 }
 
 /// The layout of mode kScene, or nothing if the objects' TEXCOORD_1 is no common atlas.
-std::optional<AtlasLayout> scene_layout(const Scene& scene, const LayoutOptions& options, double texels_per_metre) {
+absl::StatusOr<std::optional<AtlasLayout>> scene_layout(const Scene& scene, const LayoutOptions& options,
+                                                        double texels_per_metre) {
   for (const Object& object : scene.objects) {
     if (receives_lightmap(object) && !(has_unit_uv1(object) && uv1_area(object) > 0)) return std::nullopt;
   }
-  const int side = options.lightmap_size > 0 ? options.lightmap_size : scene_atlas_side(scene, texels_per_metre);
+  const double wanted =
+      options.lightmap_size > 0 ? options.lightmap_size : scene_atlas_side(scene, texels_per_metre);
+  if (!(wanted <= kMaxSide)) {
+    return absl::InvalidArgumentError(absl::StrCat("the scene's atlas would be ", wanted,
+                                                   " texels wide, over ", kMaxSide,
+                                                   "; lower the texels per metre"));
+  }
+  const int side = static_cast<int>(wanted);
   AtlasLayout layout;
   layout.mode = LayoutMode::kScene;
   layout.width = layout.height = side;
@@ -107,7 +116,7 @@ std::optional<AtlasLayout> scene_layout(const Scene& scene, const LayoutOptions&
     claims.claim(layout.uv[i], static_cast<uint32_t>(i));
   }
   if (!claims.disjoint()) return std::nullopt;
-  return layout;
+  return std::optional(std::move(layout));
 }
 
 /// Metres per unit of u and of v, averaged over the surface: the lengths of dp/du and dp/dv.
@@ -120,7 +129,8 @@ Vec2 metres_per_uv(const Object& object) {
     const Vec3 q = object.positions[t.v[2]] - object.positions[t.v[0]];
     const float determinant = e.x * f.y - f.x * e.y;
     const double weight = triangle_area(object, t);
-    const double du = length((p * f.y - q * e.y) / determinant), dv = length((q * e.x - p * f.x) / determinant);
+    const double du = length((p * f.y - q * e.y) / determinant),
+                 dv = length((q * e.x - p * f.x) / determinant);
     if (!std::isfinite(weight * du) || !std::isfinite(weight * dv)) continue;
     along_u += weight * du;
     along_v += weight * dv;
@@ -129,8 +139,8 @@ Vec2 metres_per_uv(const Object& object) {
   return area > 0 ? Vec2{static_cast<float>(along_u / area), static_cast<float>(along_v / area)} : Vec2{};
 }
 
-/// The object's own TEXCOORD_1 at the wanted density, cropped to what it uses; nothing if it is missing, overlaps
-/// itself, or wastes so much of [0,1]² that the image would be too large.
+/// The object's own TEXCOORD_1 at the wanted density, cropped to what it uses; nothing if it is missing,
+/// overlaps itself, or wastes so much of [0,1]² that the image would be too large.
 std::optional<LightmapUv> own_uv1(const Object& object, double texels_per_metre) {
   if (!has_unit_uv1(object)) return std::nullopt;
   const double uv_area = uv1_area(object);
@@ -142,7 +152,8 @@ std::optional<LightmapUv> own_uv1(const Object& object, double texels_per_metre)
   const double aspect = double{metres.x} / metres.y;
   const double width = std::ceil(std::sqrt(wanted * aspect)), height = std::ceil(std::sqrt(wanted / aspect));
   if (!(width <= kMaxSide && height <= kMaxSide)) return std::nullopt;
-  LightmapUv uv = scaled_uv1(object, std::max(1, static_cast<int>(width)), std::max(1, static_cast<int>(height)));
+  LightmapUv uv =
+      scaled_uv1(object, std::max(1, static_cast<int>(width)), std::max(1, static_cast<int>(height)));
 
   Vec2 lo = uv.corners[0][0], hi = lo;
   for (const auto& corners : uv.corners) {
@@ -197,6 +208,7 @@ absl::StatusOr<AtlasLayout> per_object_layout(const Scene& scene, const LayoutOp
 absl::StatusOr<AtlasLayout> make_layout(const Scene& scene, const LayoutOptions& options) {
   LL_RETURN_IF_ERROR(check_arguments(scene, options));
   const double texels_per_metre = choose_density(scene, options);
+  std::optional<AtlasLayout> common;
   AtlasLayout layout;
   if (std::none_of(scene.objects.begin(), scene.objects.end(), receives_lightmap)) {
     layout.mode = LayoutMode::kPerObject;
@@ -204,11 +216,15 @@ absl::StatusOr<AtlasLayout> make_layout(const Scene& scene, const LayoutOptions&
     layout.height = options.earlier_height;
     layout.uv.resize(scene.objects.size());
     layout.placements.resize(scene.objects.size());
-  } else if (std::optional<AtlasLayout> common;
-             options.earlier_width <= 0 && (common = scene_layout(scene, options, texels_per_metre))) {
-    layout = *std::move(common);
   } else {
-    LL_ASSIGN_OR_RETURN(layout, per_object_layout(scene, options, texels_per_metre));
+    if (options.earlier_width <= 0) {
+      LL_ASSIGN_OR_RETURN(common, scene_layout(scene, options, texels_per_metre));
+    }
+    if (common) {
+      layout = *std::move(common);
+    } else {
+      LL_ASSIGN_OR_RETURN(layout, per_object_layout(scene, options, texels_per_metre));
+    }
   }
   layout.texels_per_metre = static_cast<float>(texels_per_metre);
   return layout;

@@ -30,7 +30,8 @@ Shape shape_of(const Object& object, const Triangle& triangle) {
   s.ny = uz * vx - ux * vz;
   s.nz = ux * vy - uy * vx;
   s.twice_area = std::sqrt(s.nx * s.nx + s.ny * s.ny + s.nz * s.nz);
-  s.longest2 = std::max({ux * ux + uy * uy + uz * uz, vx * vx + vy * vy + vz * vz, wx * wx + wy * wy + wz * wz});
+  s.longest2 =
+      std::max({ux * ux + uy * uy + uz * uz, vx * vx + vy * vy + vz * vz, wx * wx + wy * wy + wz * wz});
   return s;
 }
 
@@ -44,9 +45,8 @@ std::vector<uint32_t> weld(const std::vector<Vec3>& positions) {
   };
   std::vector<uint32_t> order(positions.size());
   std::iota(order.begin(), order.end(), 0u);
-  std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
-    return std::pair(key(a), a) < std::pair(key(b), b);
-  });
+  std::sort(order.begin(), order.end(),
+            [&](uint32_t a, uint32_t b) { return std::pair(key(a), a) < std::pair(key(b), b); });
   std::vector<uint32_t> welded(positions.size());
   for (size_t i = 0; i < order.size(); ++i) {
     const bool same = i > 0 && key(order[i]) == key(order[i - 1]);

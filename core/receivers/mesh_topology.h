@@ -14,15 +14,15 @@ struct MeshTopology {
 
   std::vector<Vec3> normal;  ///< per triangle: geometric, unit; zero for degenerate triangles
   std::vector<double> area;  ///< per triangle, m²; zero for degenerate triangles
-  /// Per triangle: two per edge, kNone where absent. Three or more triangles on one edge are linked as a chain in
-  /// index order. Degenerate triangles have none.
+  /// Per triangle: two per edge, kNone where absent. Three or more triangles on one edge are linked as a
+  /// chain in index order. Degenerate triangles have none.
   std::vector<std::array<uint32_t, 6>> neighbours;
 
   bool degenerate(uint32_t t) const { return area[t] == 0; }
 };
 
-/// Vertices are the same where their positions are exactly equal. Triangles that are needles beyond float precision
-/// or not finite are degenerate. REQUIRES: indices within the object's positions.
+/// Vertices are the same where their positions are exactly equal. Triangles that are needles beyond float
+/// precision or not finite are degenerate. REQUIRES: indices within the object's positions.
 MeshTopology build_topology(const Object& object);
 
 /// Connected components of `triangles`, each in the order of `triangles`, sorted by first appearance.

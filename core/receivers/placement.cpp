@@ -12,7 +12,8 @@ namespace lightloom {
 namespace {
 
 constexpr int kGutter = 1;
-// Work limit of the search for holes, in comparisons of rectangles; beyond it, new objects go below the others.
+// Work limit of the search for holes, in comparisons of rectangles; beyond it, new objects go below the
+// others.
 constexpr uint64_t kHoleSearch = uint64_t{1} << 30;
 
 struct Rect {
@@ -25,8 +26,8 @@ bool touch(const Rect& a, const Rect& b) {
          b.y < a.y + a.height + kGutter;
 }
 
-/// First-fit in the free space of a fixed area: the topmost place, of those the leftmost, among places that lie below
-/// and right of others. `placed` is kept sorted by x.
+/// First-fit in the free space of a fixed area: the topmost place, of those the leftmost, among places that
+/// lie below and right of others. `placed` is kept sorted by x.
 class HoleFinder {
  public:
   HoleFinder(int width, int height, std::vector<Rect> placed)
@@ -70,8 +71,8 @@ absl::StatusOr<PlacedImage> place_objects(const std::vector<RectSize>& sizes, co
   const bool fresh = options.earlier_width <= 0 || options.earlier_height <= 0;
   if (fresh) image.width = image.height = 0;
   const auto too_large = [&] {
-    return absl::InvalidArgumentError(absl::StrCat("lightmaps of all objects do not fit ", max_size, " x ", max_size,
-                                                   " texels; lower the texels per metre"));
+    return absl::InvalidArgumentError(absl::StrCat("lightmaps of all objects do not fit ", max_size, " x ",
+                                                   max_size, " texels; lower the texels per metre"));
   };
   if (image.width > max_size || image.height > max_size) return too_large();
 
@@ -122,9 +123,10 @@ absl::StatusOr<PlacedImage> place_objects(const std::vector<RectSize>& sizes, co
                        image.width, "; lower its texel scale or bake without the earlier layout"));
     }
   }
-  const std::optional<Packing> packing =
-      fresh ? pack_near_square(rest, kGutter, max_size)
-            : bottom < max_size ? pack_strip(rest, kGutter, image.width, max_size - bottom) : std::nullopt;
+  const std::optional<Packing> packing = fresh ? pack_near_square(rest, kGutter, max_size)
+                                         : bottom < max_size
+                                             ? pack_strip(rest, kGutter, image.width, max_size - bottom)
+                                             : std::nullopt;
   if (!packing) return too_large();
   for (size_t k = 0; k < waiting.size(); ++k) {
     image.placements[waiting[k]] = {packing->positions[k].x, bottom + packing->positions[k].y};

@@ -16,8 +16,9 @@ struct PlacedImage {
   std::vector<Placement> placements;
 };
 
-/// One texel at least between any two rectangles. Those of size 0 are ignored and placed at (0,0). Earlier places are
-/// kept as LayoutOptions says. Errors: a rectangle wider than the earlier image; an image over max_size.
+/// One texel at least between any two rectangles. Those of size 0 are ignored and placed at (0,0). Earlier
+/// places are kept as LayoutOptions says. Errors: a rectangle wider than the earlier image; an image over
+/// max_size.
 absl::StatusOr<PlacedImage> place_objects(const std::vector<RectSize>& sizes, const std::vector<Digest>& ids,
                                           const LayoutOptions& options, int max_size);
 

@@ -1,10 +1,12 @@
-// Exact rasterisation of triangles in fixed point. Triangles that share an edge never share a sample, and leave none out.
+// Exact rasterisation of triangles in fixed point. Triangles that share an edge never share a sample, and
+// leave none out.
 #pragma once
 
 #include <algorithm>
 #include <array>
 #include <cstdint>
 #include <cstdlib>
+#include <utility>
 
 namespace lightloom {
 
@@ -27,6 +29,7 @@ inline int64_t floor_div(int64_t a, int64_t b) {
   const int64_t q = a / b;
   return q - ((a % b != 0) && ((a < 0) != (b < 0)) ? 1 : 0);
 }
+/// REQUIRES: b != 0. Both round correctly for either sign of b.
 inline int64_t ceil_div(int64_t a, int64_t b) { return -floor_div(-a, b); }
 
 /// Twice the signed area.
@@ -34,9 +37,10 @@ inline int64_t twice_area(const GridTriangle& t) {
   return int64_t{t[1].x - t[0].x} * (t[2].y - t[0].y) - int64_t{t[1].y - t[0].y} * (t[2].x - t[0].x);
 }
 
-/// Calls span(j, first, last) for each row j that has samples inside the triangle, of either orientation: those with
-/// first <= i <= last. margin = 0 uses a fill rule that gives samples on a shared edge to one side; margin > 0 takes
-/// only samples at least that far (1/kGrid texels) from every edge.
+/// Calls span(j, first, last) for each row j that has samples inside the triangle, of either orientation:
+/// those with first <= i <= last. margin = 0 uses a fill rule that gives samples on a shared edge to one
+/// side; margin > 0 takes only samples at least that far (1/kGrid texels) from every edge. Stops early once
+/// span() returns false.
 template <class Span>
 void rasterise(GridTriangle t, SampleLattice lattice, int32_t margin, const Span& span) {
   const int64_t area = twice_area(t);
@@ -67,7 +71,8 @@ void rasterise(GridTriangle t, SampleLattice lattice, int32_t margin, const Span
     }
     const int64_t first = ceil_div(lo - lattice.offset, lattice.step);
     const int64_t last = floor_div(hi - lattice.offset, lattice.step);
-    if (first <= last) span(static_cast<int32_t>(j), static_cast<int32_t>(first), static_cast<int32_t>(last));
+    if (first > last) continue;
+    if (!span(static_cast<int32_t>(j), static_cast<int32_t>(first), static_cast<int32_t>(last))) return;
   }
 }
 

@@ -8,8 +8,8 @@
 namespace lightloom {
 namespace {
 
-constexpr float kRounding = 1e-4f;  // how far outside [0,1] a coordinate may lie
-constexpr uint64_t kCoats = 32;     // times a texel may be painted on average before the count is given up
+constexpr float kRounding = 1e-4f;                   // how far outside [0,1] a coordinate may lie
+constexpr uint64_t kPaintLimit = uint64_t{1} << 31;  // texels and rows, before the count is given up
 constexpr uint64_t kForgiven = 1000;
 constexpr uint32_t kShared = 0xffffffffu;
 
@@ -18,7 +18,8 @@ constexpr uint32_t kShared = 0xffffffffu;
 bool has_unit_uv1(const Object& object) {
   if (object.uv1.empty() || object.uv1.size() != object.positions.size()) return false;
   const auto inside = [](float c) { return c >= -kRounding && c <= 1 + kRounding; };
-  return std::all_of(object.uv1.begin(), object.uv1.end(), [&](Vec2 p) { return inside(p.x) && inside(p.y); });
+  return std::all_of(object.uv1.begin(), object.uv1.end(),
+                     [&](Vec2 p) { return inside(p.x) && inside(p.y); });
 }
 
 LightmapUv scaled_uv1(const Object& object, int width, int height) {
@@ -37,7 +38,8 @@ double uv1_area(const Object& object) {
   double area = 0;
   for (const Triangle& t : object.triangles) {
     const Vec2 a = object.uv1[t.v[0]], b = object.uv1[t.v[1]], c = object.uv1[t.v[2]];
-    area += 0.5 * std::abs((double{b.x} - a.x) * (double{c.y} - a.y) - (double{b.y} - a.y) * (double{c.x} - a.x));
+    area +=
+        0.5 * std::abs((double{b.x} - a.x) * (double{c.y} - a.y) - (double{b.y} - a.y) * (double{c.x} - a.x));
   }
   return area;
 }
@@ -53,9 +55,7 @@ void TexelClaims::claim_each(const LightmapUv& uv) {
   for (uint32_t t = 0; t < uv.corners.size(); ++t) paint(uv.corners[t], t + 1);
 }
 
-bool TexelClaims::disjoint() const {
-  return painted_ <= kCoats * owner_.size() && shared_ * kForgiven <= covered_;
-}
+bool TexelClaims::disjoint() const { return painted_ <= kPaintLimit && shared_ * kForgiven <= covered_; }
 
 void TexelClaims::paint(const std::array<Vec2, 3>& corners, uint32_t owner) {
   GridTriangle triangle;
@@ -63,11 +63,14 @@ void TexelClaims::paint(const std::array<Vec2, 3>& corners, uint32_t owner) {
     triangle[k] = {static_cast<int32_t>(std::floor(corners[k].x * kGrid + 0.5f)),
                    static_cast<int32_t>(std::floor(corners[k].y * kGrid + 0.5f))};
   }
-  if (painted_ > kCoats * owner_.size()) return;
+  if (painted_ > kPaintLimit) return;
+  const auto [low, high] = std::minmax({triangle[0].y, triangle[1].y, triangle[2].y});
+  painted_ += static_cast<uint64_t>((high - low) / kGrid);
   rasterise(triangle, {}, 0, [&](int y, int first, int last) {
     painted_ += static_cast<uint64_t>(last - first + 1);
     for (int x = first; x <= last; ++x) {
-      uint32_t& claimed = owner_[static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x)];
+      uint32_t& claimed =
+          owner_[static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x)];
       if (claimed == 0) {
         claimed = owner;
         ++covered_;
@@ -76,6 +79,7 @@ void TexelClaims::paint(const std::array<Vec2, 3>& corners, uint32_t owner) {
         ++shared_;
       }
     }
+    return true;
   });
 }
 

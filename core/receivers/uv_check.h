@@ -28,8 +28,9 @@ class TexelClaims {
   /// The same, each triangle an owner of its own: overlap within one object counts.
   void claim_each(const LightmapUv& uv);
 
-  /// True if no more than one in a thousand of the covered texels has two owners: exporters leave a few such texels
-  /// where charts come close. Also false if texels were painted over so often that the count was given up.
+  /// True if no more than one in a thousand of the covered texels has two owners: exporters leave a few such
+  /// texels where charts come close. Also false if texels were painted over so often that the count was given
+  /// up.
   bool disjoint() const;
 
  private:
