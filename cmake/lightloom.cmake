@@ -10,7 +10,7 @@ endif()
 add_compile_options(-ffp-contract=off)
 
 if(LIGHTLOOM_SANITIZE)
-  add_compile_options(-fsanitize=${LIGHTLOOM_SANITIZE} -fno-omit-frame-pointer -g)
+  add_compile_options(-fsanitize=${LIGHTLOOM_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer -g)
   add_link_options(-fsanitize=${LIGHTLOOM_SANITIZE})
 endif()
 
