@@ -10,8 +10,11 @@ endif()
 add_compile_options(-ffp-contract=off)
 
 if(LIGHTLOOM_SANITIZE)
-  add_compile_options(-fsanitize=${LIGHTLOOM_SANITIZE} -fno-omit-frame-pointer -g)
+  add_compile_options(-fsanitize=${LIGHTLOOM_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer -g)
   add_link_options(-fsanitize=${LIGHTLOOM_SANITIZE})
+  if(LIGHTLOOM_SANITIZE MATCHES "thread" AND CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
+    add_compile_options(-fsanitize-ignorelist=${PROJECT_SOURCE_DIR}/tests/sanitizers/tsan.ignorelist)
+  endif()
 endif()
 
 find_package(Threads REQUIRED)
