@@ -45,7 +45,7 @@ std::string human_seconds(double s) {
 
 ProgressBar::ProgressBar() : on_(::isatty(STDERR_FILENO) == 1), started_(Clock::now()), last_(started_) {}
 
-void ProgressBar::update(const std::string& stage, uint64_t done, uint64_t total, const std::string& note) {
+void ProgressBar::update(const std::string& stage, uint64_t done, uint64_t total, uint64_t rays) {
   const auto now = Clock::now();
   if (stage != stage_) {
     finish();
@@ -63,8 +63,9 @@ void ProgressBar::update(const std::string& stage, uint64_t done, uint64_t total
   std::string bar(static_cast<size_t>(filled), '=');
   bar.resize(kWidth, ' ');
   const std::string eta = share > 0 && done < total ? " ETA " + human_seconds(seconds / share - seconds) : "";
+  const std::string rate = rays > 0 && seconds > 0 ? human_count(static_cast<double>(rays) / seconds) + "rays/s" : "";
   std::fprintf(stderr, "\r\033[K%-22s [%s] %3.0f %%  %s%s  %s", stage.c_str(), bar.c_str(), share * 100,
-               human_seconds(seconds).c_str(), eta.c_str(), note.c_str());
+               human_seconds(seconds).c_str(), eta.c_str(), rate.c_str());
   drawn_ = true;
 }
 

@@ -14,8 +14,8 @@ class ProgressBar {
   ProgressBar();
   ~ProgressBar() { finish(); }
 
-  /// Shows `done` of `total` of `stage`; `note` is shown behind it (a rate, say). Redraws ten times a second at most.
-  void update(const std::string& stage, uint64_t done, uint64_t total, const std::string& note = "");
+  /// Shows `done` of `total` of `stage`, and the rate of `rays` since it began. Redraws ten times a second at most.
+  void update(const std::string& stage, uint64_t done, uint64_t total, uint64_t rays = 0);
   void finish();
   /// A loop's options that report here.
   Parallel parallel(const std::string& stage, int threads);

@@ -1,5 +1,6 @@
 #include "core/bake/bake.h"
 
+#include <atomic>
 #include <chrono>
 #include <mutex>
 
@@ -66,8 +67,14 @@ absl::StatusOr<BakeReport> bake(const RayTracer& tracer, const BakeParams& param
   const auto cells_start = std::chrono::steady_clock::now();
   std::vector<CellResult> cells(plan.cells.size());
   std::vector<ChunkRef> cell_refs(plan.cells.size());
-  bool done = parallel_for(cells.size(), control.stage("cells"), [&](uint64_t i) {
+  std::atomic<uint64_t> rays{0};
+  Parallel cell_stage = control.stage("cells");
+  if (control.progress) {
+    cell_stage.progress = [&](uint64_t finished, uint64_t total) { control.progress("cells", finished, total, rays.load()); };
+  }
+  bool done = parallel_for(cells.size(), cell_stage, [&](uint64_t i) {
     cells[i] = bake_cell(tracer, make_cell_task(plan, scene, plan.cells[i]));
+    rays += cells[i].stats.gather_rays + cells[i].stats.visibility_rays;
     cell_refs[i] = writer.put(encode_cell(cells[i].chunk));
   });
   if (!done) return absl::CancelledError("bake cancelled; finished chunks are kept, the old manifest stays in force");

@@ -79,7 +79,7 @@ Parallel BakeControl::stage(const std::string& name) const {
   how.threads = threads;
   how.cancel = cancel;
   if (progress) {
-    how.progress = [report = progress, name](uint64_t done, uint64_t total) { report(name, done, total); };
+    how.progress = [report = progress, name](uint64_t done, uint64_t total) { report(name, done, total, 0); };
   }
   return how;
 }

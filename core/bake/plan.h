@@ -16,8 +16,9 @@
 
 namespace lightloom {
 
-/// Names a stage and how far it is; called from worker threads, one call at a time.
-using StageProgress = std::function<void(const std::string& stage, uint64_t done, uint64_t total)>;
+/// Names a stage, how far it is and how many rays it has shot (0 where that is not counted); called from worker threads,
+/// one call at a time.
+using StageProgress = std::function<void(const std::string& stage, uint64_t done, uint64_t total, uint64_t rays)>;
 
 struct BakeControl {
   int threads = 0;  ///< 0: one per hardware thread

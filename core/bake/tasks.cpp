@@ -161,7 +161,7 @@ RelightChunk bake_relight(const RayTracer& tracer, const Plan& plan, Vec3 probe)
 SurfaceChunk make_surface(const Plan& plan, const Scene& scene, uint32_t object) {
   SurfaceChunk out;
   out.object = chunk_object(plan, scene, object);
-  for (uint32_t i = plan.receivers.first[object]; i < plan.receivers.first[object + 1]; ++i) {
+  for (uint32_t i = plan.receivers.ranges[object].begin; i < plan.receivers.ranges[object].end; ++i) {
     const Receiver& r = plan.receivers.all[i];
     const Texel& texel = plan.receivers.grids[object].texels[r.texel];
     out.keys.push_back(r.key);

@@ -33,14 +33,14 @@ Space classify(const RayTracer& tracer, const ShadingPoint& point, uint64_t seed
 }  // namespace
 
 uint32_t Receivers::find(uint32_t object, uint32_t key) const {
-  const auto begin = all.begin() + first[object], end = all.begin() + first[object + 1];
+  const auto begin = all.begin() + ranges[object].begin, end = all.begin() + ranges[object].end;
   const auto it = std::lower_bound(begin, end, key, [](const Receiver& r, uint32_t k) { return r.key < k; });
   return it != end && it->key == key ? static_cast<uint32_t>(it - all.begin()) : kNone;
 }
 
 uint32_t Receivers::locate(const AtlasLayout& layout, const Hit& hit) const {
   const LightmapUv& uv = layout.uv[hit.object];
-  if (uv.corners.empty() || first[hit.object] == first[hit.object + 1]) return kNone;
+  if (uv.corners.empty() || ranges[hit.object].begin == ranges[hit.object].end) return kNone;
   const auto& c = uv.corners[hit.triangle];
   const Vec2 p = c[0] * (1 - hit.b1 - hit.b2) + c[1] * hit.b1 + c[2] * hit.b2;
   const int x = std::clamp(static_cast<int>(std::floor(p.x)), 0, uv.width - 1);
@@ -109,10 +109,10 @@ absl::StatusOr<Receivers> find_receivers(const RayTracer& tracer, const AtlasLay
   });
   if (!done) return absl::CancelledError("cancelled while finding receivers");
 
-  out.first.assign(scene.objects.size() + 1, 0);
+  out.ranges.resize(scene.objects.size());
   size_t i = 0;
   for (uint32_t o = 0; o < scene.objects.size(); ++o) {
-    out.first[o] = static_cast<uint32_t>(out.all.size());
+    out.ranges[o].begin = static_cast<uint32_t>(out.all.size());
     const size_t begin = i;
     while (i < items.size() && items[i].object == o) ++i;
     for (size_t side = 0; side < 2; ++side) {
@@ -122,8 +122,8 @@ absl::StatusOr<Receivers> find_receivers(const RayTracer& tracer, const AtlasLay
         if (side == 0 && space == Space::kSolid) ++out.solid_texels;
       }
     }
+    out.ranges[o].end = static_cast<uint32_t>(out.all.size());
   }
-  out.first.back() = static_cast<uint32_t>(out.all.size());
   return out;
 }
 

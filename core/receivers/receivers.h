@@ -26,8 +26,11 @@ struct Receivers {
   static constexpr uint32_t kNone = 0xffffffffu;
 
   std::vector<TexelGrid> grids;     ///< per object
-  std::vector<Receiver> all;        ///< sorted by (object, key)
-  std::vector<uint32_t> first;      ///< per object, its range of `all`; one more entry at the end
+  std::vector<Receiver> all;        ///< by object, keys ascending within each
+  struct Range {
+    uint32_t begin = 0, end = 0;
+  };
+  std::vector<Range> ranges;        ///< per object, its part of `all`
   uint64_t solid_texels = 0;        ///< front sides dropped as inside solids
 
   /// Index into `all`, or kNone.

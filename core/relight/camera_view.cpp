@@ -1,0 +1,75 @@
+#include "core/relight/camera_view.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/sampling.h"
+#include "core/reference/path_tracer.h"
+
+namespace lightloom {
+namespace {
+
+Vec3 shade(const RayTracer& tracer, const SurfaceElements& elements, std::span<const Vec3> irradiance, const Hit& hit,
+           Layer layer) {
+  const Scene& scene = tracer.scene();
+  const Object& object = scene.objects[hit.object];
+  const Triangle& t = object.triangles[hit.triangle];
+  if (hit.back && !scene.materials[t.material].double_sided) return {};
+  Vec3 light;
+  if (layer != Layer::kDirect) light += sample_irradiance(elements, irradiance, hit);
+  if (layer == Layer::kE) return light / kPi;
+  if (layer != Layer::kIndirect) {
+    light += direct_irradiance(tracer, shading_point(object, hit.triangle, hit.b1, hit.b2, hit.back));
+  }
+  Vec3 radiance = albedo_at(scene, object, t, hit.b1, hit.b2) * light / kPi;
+  if (layer != Layer::kIndirect && !hit.back) radiance += emission_at(scene, object, t, hit.b1, hit.b2);
+  return radiance;
+}
+
+}  // namespace
+
+absl::StatusOr<Image> render_view(const RayTracer& tracer, const SurfaceElements& elements,
+                                  std::span<const Vec3> irradiance, const Camera& camera, const ViewOptions& options) {
+  const int height = std::max(1, static_cast<int>(std::lround(static_cast<float>(options.width) / camera.aspect)));
+  Image image(options.width, height, {"R", "G", "B"});
+  const uint32_t side = std::max(1u, static_cast<uint32_t>(std::sqrt(static_cast<float>(options.samples))));
+  const bool done = parallel_for(static_cast<uint64_t>(height), options.parallel, [&](uint64_t row) {
+    for (int x = 0; x < options.width; ++x) {
+      Rng rng(hash_combine(row, static_cast<uint64_t>(x)));
+      Vec3 sum;
+      for (uint32_t s = 0; s < side * side; ++s) {
+        const Sample2 jitter = stratified(s, side, &rng);
+        const Vec3 direction = camera_direction(camera, (static_cast<float>(x) + jitter.u) / static_cast<float>(options.width),
+                                                (static_cast<float>(row) + jitter.v) / static_cast<float>(height));
+        const Hit hit = tracer.closest(camera.position, direction);
+        sum += hit ? shade(tracer, elements, irradiance, hit, options.layer) : tracer.scene().environment;
+      }
+      image.set_rgb(x, static_cast<int>(row), sum / static_cast<float>(side * side));
+    }
+  });
+  if (!done) return absl::CancelledError("cancelled while rendering");
+  return image;
+}
+
+float expose(Image* image, float factor) {
+  if (factor <= 0) {
+    double sum = 0, count = 0;
+    for (int y = 0; y < image->height; ++y) {
+      for (int x = 0; x < image->width; ++x) {
+        const float luminance = dot(image->rgb(x, y), {0.2126f, 0.7152f, 0.0722f});
+        if (luminance > 0) sum += std::log(luminance), count += 1;
+      }
+    }
+    factor = count > 0 ? static_cast<float>(0.18 / std::exp(sum / count)) : 1;
+  }
+  for (int y = 0; y < image->height; ++y) {
+    for (int x = 0; x < image->width; ++x) {
+      const Vec3 v = image->rgb(x, y) * factor;
+      const auto map = [](float c) { return c * (1 + c / 16) / (1 + c); };
+      image->set_rgb(x, y, {map(v.x), map(v.y), map(v.z)});
+    }
+  }
+  return factor;
+}
+
+}  // namespace lightloom

@@ -1,0 +1,18 @@
+// Irradiance per surface element as images: the lightmap users sample, and its value at a hit.
+#pragma once
+
+#include <span>
+
+#include "core/relight/surface_inputs.h"
+#include "core/scene/image.h"
+
+namespace lightloom {
+
+/// R, G, B: E of the front side, W/m²; A: 1 at receivers; area: m² in the texel. Texels without a receiver next to one
+/// (gutters, texels inside solids) are filled from their neighbours, A = 0, so that bilinear filtering stays clean.
+Image lightmap_image(const SurfaceElements& elements, std::span<const Vec3> irradiance);
+
+/// Bilinear over the receivers of the hit's object and side around it; the nearest one if there is none.
+Vec3 sample_irradiance(const SurfaceElements& elements, std::span<const Vec3> irradiance, const Hit& hit);
+
+}  // namespace lightloom
