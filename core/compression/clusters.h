@@ -15,7 +15,7 @@ namespace lightloom {
 struct CompressionOptions {
   int order = 7;
   int max_rank = 32;
-  float threshold = 0.02f;      ///< relative Frobenius error at which the rank ends
+  float threshold = 0.05f;      ///< relative Frobenius error at which the rank ends
   uint32_t min_receivers = 128; ///< a cluster is not split below this many receivers
   uint64_t seed = 0;
 };
