@@ -34,7 +34,8 @@ inline Dvec3 transform_point(const Transform& m, Dvec3 p) {
   return out;
 }
 
-/// The cofactors of the linear part: det(M) · M⁻ᵀ, which turns normals and exists for singular M too. Column-major 3×3.
+/// The cofactors of the linear part: det(M) · M⁻ᵀ, which turns normals and exists for singular M too.
+/// Column-major 3×3.
 inline std::array<double, 9> cofactors(const Transform& m) {
   const auto cross = [&](size_t a, size_t b) {
     return Dvec3{m[a + 1] * m[b + 2] - m[a + 2] * m[b + 1], m[a + 2] * m[b] - m[a] * m[b + 2],
@@ -63,13 +64,14 @@ inline Transform inverse(const Transform& m) {
   return out;
 }
 
-/// Zero if `v` has no direction. What is unit up to float rounding stays bit for bit, so that saving a level and loading
-/// it again changes nothing.
+/// Zero if `v` has no direction. What is unit up to float rounding stays bit for bit, so that saving a level
+/// and loading it again changes nothing.
 inline Vec3 unit(Dvec3 v) {
   const double square = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
   if (!(square > 0) || !std::isfinite(square)) return {};
   const double length = std::abs(square - 1) < 3e-7 ? 1 : std::sqrt(square);
-  return {static_cast<float>(v[0] / length), static_cast<float>(v[1] / length), static_cast<float>(v[2] / length)};
+  return {static_cast<float>(v[0] / length), static_cast<float>(v[1] / length),
+          static_cast<float>(v[2] / length)};
 }
 
 }  // namespace lightloom

@@ -1,5 +1,5 @@
-// A town of 25 solid buildings on a grid of streets, 100 m across, in the sun: long distances, and much space that is
-// inside of something.
+// A town of 25 solid buildings on a grid of streets, 100 m across, in the sun: long distances, and much space
+// that is inside of something.
 #include <array>
 #include <string>
 

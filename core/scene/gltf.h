@@ -17,7 +17,9 @@ namespace lightloom {
 absl::StatusOr<Scene> load_gltf(const std::filesystem::path& path);
 
 /// Writes a self-contained .glb that load_gltf reads back to the same triangles, materials, lights and cameras:
-/// objects keep name, transform, extras and one mesh each. For make-scene and tests.
+/// objects keep name, transform, extras and one mesh each. Bit for bit where the transform is the identity; else the
+/// geometry goes back to local space and is rounded there. Objects without triangles and the environment, which glTF has
+/// no word for, are not written. The bytes depend on the scene alone. For make-scene and tests.
 absl::Status save_gltf(const Scene& scene, const std::filesystem::path& path);
 
 }  // namespace lightloom

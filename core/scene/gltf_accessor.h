@@ -1,4 +1,5 @@
-// glTF accessors as plain arrays: any component type, strided, normalised, sparse, or without a buffer view (zeros).
+// glTF accessors as plain arrays: any component type, strided, normalised, sparse, or without a buffer view
+// (zeros).
 #pragma once
 
 #include <cstdint>

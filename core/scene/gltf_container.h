@@ -12,9 +12,9 @@ class Model;
 
 namespace lightloom {
 
-/// Reads .glb or .gltf, whichever the bytes say. Buffers and image files come only from the file's own folder or below.
-/// Images stay encoded: in Image::image if they came by URI, else behind Image::bufferView. Nothing in the model is
-/// checked against anything else in it.
+/// Reads .glb or .gltf, whichever the bytes say. Buffers and image files come only from the file's own folder
+/// or below. Images stay encoded: in Image::image if they came by URI, else behind Image::bufferView. Nothing
+/// in the model is checked against anything else in it.
 absl::StatusOr<std::unique_ptr<tinygltf::Model>> read_gltf_model(const std::filesystem::path& path);
 
 }  // namespace lightloom

@@ -24,7 +24,8 @@ absl::Status invalid(std::string message) { return absl::InvalidArgumentError(st
 /// A node's own transform: its matrix, or T·R·S (glTF 2.0, 3.5.3).
 absl::StatusOr<Transform> local_transform(const tinygltf::Node& node, const std::string& whose) {
   const auto sized = [](const std::vector<double>& v, size_t n) { return v.empty() || v.size() == n; };
-  if (!sized(node.matrix, 16) || !sized(node.translation, 3) || !sized(node.rotation, 4) || !sized(node.scale, 3)) {
+  if (!sized(node.matrix, 16) || !sized(node.translation, 3) || !sized(node.rotation, 4) ||
+      !sized(node.scale, 3)) {
     return invalid(whose + ": its transform has the wrong number of values; export the file again");
   }
   Transform m = kIdentity;
@@ -35,12 +36,25 @@ absl::StatusOr<Transform> local_transform(const tinygltf::Node& node, const std:
   if (!node.rotation.empty()) {
     const auto& q = node.rotation;
     const double square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
-    if (!(square > 1e-12)) return invalid(whose + ": its rotation is not a unit quaternion; export the file again");
+    if (!(square > 1e-12))
+      return invalid(whose + ": its rotation is not a unit quaternion; export the file again");
     const double s = 2 / square, x = q[0], y = q[1], z = q[2], w = q[3];
-    m = {1 - s * (y * y + z * z), s * (x * y + z * w),     s * (x * z - y * w),     0,
-         s * (x * y - z * w),     1 - s * (x * x + z * z), s * (y * z + x * w),     0,
-         s * (x * z + y * w),     s * (y * z - x * w),     1 - s * (x * x + y * y), 0,
-         0,                       0,                       0,                       1};
+    m = {1 - s * (y * y + z * z),
+         s * (x * y + z * w),
+         s * (x * z - y * w),
+         0,
+         s * (x * y - z * w),
+         1 - s * (x * x + z * z),
+         s * (y * z + x * w),
+         0,
+         s * (x * z + y * w),
+         s * (y * z - x * w),
+         1 - s * (x * x + y * y),
+         0,
+         0,
+         0,
+         0,
+         1};
   }
   for (size_t column = 0; column < 3; ++column) {
     for (size_t row = 0; row < 3 && !node.scale.empty(); ++row) m[4 * column + row] *= node.scale[column];
@@ -59,7 +73,8 @@ Vec3 origin(const Transform& m) {
 
 class Loader {
  public:
-  Loader(const tinygltf::Model& model, Scene* scene) : model_(model), scene_(scene), meshes_(model, scene, &warnings_) {}
+  Loader(const tinygltf::Model& model, Scene* scene)
+      : model_(model), scene_(scene), meshes_(model, scene, &warnings_) {}
 
   absl::Status load() {
     LL_RETURN_IF_ERROR(read_materials(model_, scene_, &warnings_));
@@ -76,12 +91,14 @@ class Loader {
     if (!model_.scenes.empty()) {
       const int scene = model_.defaultScene < 0 ? 0 : model_.defaultScene;
       if (static_cast<size_t>(scene) >= model_.scenes.size()) {
-        return invalid("its default scene " + std::to_string(scene) + " does not exist; export the file again");
+        return invalid("its default scene " + std::to_string(scene) +
+                       " does not exist; export the file again");
       }
       return model_.scenes[static_cast<size_t>(scene)].nodes;
     }
     std::set<int> children;
-    for (const tinygltf::Node& node : model_.nodes) children.insert(node.children.begin(), node.children.end());
+    for (const tinygltf::Node& node : model_.nodes)
+      children.insert(node.children.begin(), node.children.end());
     std::vector<int> roots;
     for (int i = 0; i < static_cast<int>(model_.nodes.size()); ++i) {
       if (!children.count(i)) roots.push_back(i);
@@ -106,7 +123,8 @@ class Loader {
       const auto i = static_cast<size_t>(index);
       const tinygltf::Node& node = model_.nodes[i];
       const std::string whose = "node " + std::to_string(index) + " " + shown(node.name);
-      if (visited[i]) return invalid(whose + " is reached twice: nodes must form trees; export the file again");
+      if (visited[i])
+        return invalid(whose + " is reached twice: nodes must form trees; export the file again");
       visited[i] = true;
 
       LL_ASSIGN_OR_RETURN(const Transform local, local_transform(node, whose));
@@ -129,11 +147,13 @@ class Loader {
       if (static_cast<unsigned char>(c) < 32 || c == 127) c = '?';
     }
     std::string name = base;
-    for (uint64_t& n = copies_[base]; !names_.insert(name).second;) name = base + " #" + std::to_string(++n + 1);
+    for (uint64_t& n = copies_[base]; !names_.insert(name).second;)
+      name = base + " #" + std::to_string(++n + 1);
     return name;
   }
 
-  absl::Status add_object(const tinygltf::Node& node, int index, const std::string& whose, const Transform& world) {
+  absl::Status add_object(const tinygltf::Node& node, int index, const std::string& whose,
+                          const Transform& world) {
     Object object;
     object.name = object_name(node.name, index);
     object.transform = world;
@@ -168,7 +188,9 @@ class Loader {
         if (text != "lightmap" && text != "volume" && text != "none") {
           return invalid(where + R"(.receive must be "lightmap", "volume" or "none")");
         }
-        object->receive = text == "lightmap" ? Receive::kLightmap : text == "volume" ? Receive::kVolume : Receive::kNone;
+        object->receive = text == "lightmap" ? Receive::kLightmap
+                          : text == "volume" ? Receive::kVolume
+                                             : Receive::kNone;
       } else {
         warnings_.add("unknown keys of extras.lightloom were ignored", node_label(object->name, key));
       }
@@ -196,10 +218,12 @@ class Loader {
     out.up = cross(out.right, out.forward);
     out.yfov = static_cast<float>(in.perspective.yfov);
     if (in.perspective.aspectRatio > 0) out.aspect = static_cast<float>(in.perspective.aspectRatio);
-    if (!(out.yfov > 0 && out.yfov < std::numbers::pi_v<float>) || !std::isfinite(out.aspect) || !(out.aspect > 0)) {
+    if (!(out.yfov > 0 && out.yfov < std::numbers::pi_v<float>) || !std::isfinite(out.aspect) ||
+        !(out.aspect > 0)) {
       return invalid(whose + ": its camera's yfov must lie in (0, pi) and its aspect ratio above 0");
     }
-    if (out.right == Vec3{}) return invalid(whose + ": a camera cannot be scaled to nothing; reset its scale");
+    if (out.right == Vec3{})
+      return invalid(whose + ": a camera cannot be scaled to nothing; reset its scale");
     scene_->cameras.push_back(out);
     return absl::OkStatus();
   }
@@ -222,16 +246,20 @@ class Loader {
     } else if (in.type == "directional") {
       out.type = LightType::kDirectional;
     } else {
-      return invalid(whose + ": light type " + shown(in.type) + " is unknown; use point, spot or directional");
+      return invalid(whose + ": light type " + shown(in.type) +
+                     " is unknown; use point, spot or directional");
     }
     out.name = !node.name.empty() ? node.name : in.name;
     out.position = origin(world);
     if (out.type != LightType::kPoint) {
       out.direction = axis(world, 2, -1);
-      if (out.direction == Vec3{}) return invalid(whose + ": a light cannot be scaled to nothing; reset its scale");
+      if (out.direction == Vec3{})
+        return invalid(whose + ": a light cannot be scaled to nothing; reset its scale");
     }
-    if (!in.color.empty() && in.color.size() != 3) return invalid(whose + ": its light's color must have 3 numbers");
-    for (int c = 0; c < 3 && !in.color.empty(); ++c) out.color[c] = static_cast<float>(in.color[static_cast<size_t>(c)]);
+    if (!in.color.empty() && in.color.size() != 3)
+      return invalid(whose + ": its light's color must have 3 numbers");
+    for (int c = 0; c < 3 && !in.color.empty(); ++c)
+      out.color[c] = static_cast<float>(in.color[static_cast<size_t>(c)]);
     out.intensity = static_cast<float>(in.intensity);
     out.range = static_cast<float>(in.range);
     out.inner_cone_angle = static_cast<float>(in.spot.innerConeAngle);
@@ -242,8 +270,8 @@ class Loader {
       }
     }
     if (out.type == LightType::kSpot &&
-        !(out.inner_cone_angle >= 0 && out.inner_cone_angle <= out.outer_cone_angle && out.outer_cone_angle > 0 &&
-          out.outer_cone_angle <= 1.5708f)) {
+        !(out.inner_cone_angle >= 0 && out.inner_cone_angle <= out.outer_cone_angle &&
+          out.outer_cone_angle > 0 && out.outer_cone_angle <= 1.5708f)) {
       return invalid(whose + ": its light's cone angles must be 0 <= inner <= outer <= pi/2");
     }
     scene_->lights.push_back(std::move(out));

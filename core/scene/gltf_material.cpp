@@ -32,7 +32,8 @@ absl::StatusOr<ByteRange> image_bytes(const tinygltf::Model& model, const tinygl
                                       const std::string& whose) {
   if (image.bufferView >= 0) return buffer_view_bytes(model, image.bufferView);
   if (image.image.empty()) {
-    return invalid(whose + ": image " + shown(image.uri) + " is missing or empty; put it beside the glTF file");
+    return invalid(whose + ": image " + shown(image.uri) +
+                   " is missing or empty; put it beside the glTF file");
   }
   return ByteRange{image.image.data(), image.image.size(), 0};
 }
@@ -107,8 +108,8 @@ class TextureReader {
   uint64_t bytes_ = 0;
 };
 
-absl::Status read_texture(const tinygltf::TextureInfo& info, const std::string& whose, TextureReader* textures,
-                          GltfWarnings* warnings, int* texture, int* uv) {
+absl::Status read_texture(const tinygltf::TextureInfo& info, const std::string& whose,
+                          TextureReader* textures, GltfWarnings* warnings, int* texture, int* uv) {
   if (info.index == -1) return absl::OkStatus();
   if (info.texCoord != 0 && info.texCoord != 1) {
     return invalid(whose + " uses TEXCOORD_" + std::to_string(info.texCoord) + "; only 0 and 1 are read");
@@ -130,8 +131,8 @@ absl::StatusOr<double> emissive_strength(const tinygltf::Material& in, const std
   return strength;
 }
 
-absl::StatusOr<Material> read_material(const tinygltf::Material& in, const std::string& whose, TextureReader* textures,
-                                       GltfWarnings* warnings) {
+absl::StatusOr<Material> read_material(const tinygltf::Material& in, const std::string& whose,
+                                       TextureReader* textures, GltfWarnings* warnings) {
   Material out;
   out.name = in.name;
   const auto& pbr = in.pbrMetallicRoughness;

@@ -13,7 +13,7 @@
 namespace tinygltf {
 class Model;
 struct Primitive;
-}
+}  // namespace tinygltf
 
 namespace lightloom {
 
@@ -24,8 +24,8 @@ class MeshReader {
   MeshReader(const tinygltf::Model& model, Scene* scene, GltfWarnings* warnings)
       : model_(model), scene_(scene), warnings_(warnings), hasher_(*scene) {}
 
-  /// Fills the geometry and mesh_hash of an object whose name and transform are set: all primitives merged, without
-  /// triangles that have no area or are not finite. May leave no triangles.
+  /// Fills the geometry and mesh_hash of an object whose name and transform are set: all primitives merged,
+  /// without triangles that have no area or are not finite. May leave no triangles.
   absl::Status read(int mesh, Object* object);
 
  private:

@@ -13,7 +13,8 @@ std::string shown(std::string_view name);
 
 class GltfWarnings {
  public:
-  /// `what` reads after a count: "triangles without area were left out". `name` is the element it happened in.
+  /// `what` reads after a count: "triangles without area were left out". `name` is the element it happened
+  /// in.
   void add(std::string_view what, std::string_view name, uint64_t count = 1);
   /// In order of first appearance: `3 triangles without area were left out (in "a", "b" and 4 others)`.
   std::vector<std::string> lines() const;

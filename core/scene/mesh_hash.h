@@ -13,8 +13,8 @@ class MeshHasher {
  public:
   explicit MeshHasher(const Scene& scene) : scene_(scene) {}
 
-  /// SHA-256 of positions, normals, uv1 and triangles, with per triangle the alpha mode, sidedness and, where masked, all
-  /// that shapes the holes. Not of albedo, emission or names, nor of uv0 unless it shapes holes.
+  /// SHA-256 of positions, normals, uv1 and triangles, with per triangle the alpha mode, sidedness and, where
+  /// masked, all that shapes the holes. Not of albedo, emission or names, nor of uv0 unless it shapes holes.
   /// `local`: its geometry is in the space of the node.
   Digest hash(const Object& local);
 

@@ -45,10 +45,12 @@ void add_quad(Object* object, Vec3 a, Vec3 b, Vec3 c, Vec3 d, uint32_t material)
   object->triangles.push_back({{v0, v2, v3}, material});
 }
 
-void add_box(Object* object, Vec3 lo, Vec3 hi, uint32_t material) { add_wall(object, lo, hi, 2, {}, material, material); }
+void add_box(Object* object, Vec3 lo, Vec3 hi, uint32_t material) {
+  add_wall(object, lo, hi, 2, {}, material, material);
+}
 
-void add_wall(Object* object, Vec3 lo, Vec3 hi, int thin, const std::vector<Opening>& openings, uint32_t negative,
-              uint32_t positive) {
+void add_wall(Object* object, Vec3 lo, Vec3 hi, int thin, const std::vector<Opening>& openings,
+              uint32_t negative, uint32_t positive) {
   LL_CHECK(thin == 0 || thin == 2);
   const int along = 2 - thin;
   std::vector<float> inner_u, inner_v;
@@ -168,7 +170,8 @@ void add_sphere(Object* object, Vec3 center, float radius, int segments, uint32_
   add_lathe(object, lathe, material);
 }
 
-void add_torus(Object* object, Vec3 center, int axis, float radius, float tube, int segments, uint32_t material) {
+void add_torus(Object* object, Vec3 center, int axis, float radius, float tube, int segments,
+               uint32_t material) {
   Lathe lathe;
   lathe.center = center;
   lathe.axis = axis;
