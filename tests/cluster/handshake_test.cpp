@@ -102,10 +102,14 @@ TEST_P(Handshake, TheHealthServiceSaysServing) {
   context.set_deadline(std::chrono::system_clock::now() + kPatience);
   const grpc::ByteBuffer request(nullptr, 0);
   grpc::ByteBuffer response;
-  std::promise<grpc::Status> done;
-  stub.UnaryCall(&context, "/grpc.health.v1.Health/Check", {}, &request, &response,
-                 [&done](grpc::Status status) { done.set_value(std::move(status)); });
-  const grpc::Status status = done.get_future().get();
+  grpc::CompletionQueue queue;
+  const auto call = stub.PrepareUnaryCall(&context, "/grpc.health.v1.Health/Check", request, &queue);
+  call->StartCall();
+  grpc::Status status;
+  call->Finish(&response, &status, nullptr);
+  void* tag = nullptr;
+  bool event_ok = false;
+  ASSERT_TRUE(queue.Next(&tag, &event_ok));
   ASSERT_TRUE(status.ok()) << status.error_message();
   grpc::Slice bytes;
   ASSERT_TRUE(response.DumpToSingleSlice(&bytes).ok());
