@@ -6,6 +6,9 @@
 
 #include <chrono>
 #include <future>
+#include <memory>
+#include <string>
+#include <vector>
 
 #include "bake-server/grpc/server.h"
 #include "bake-worker/join.h"
@@ -74,6 +77,7 @@ TEST_P(Handshake, AWorkerWithoutAvx2IsRefused) {
 
 TEST_P(Handshake, ManyWorkersAtOnceGetTheirOwnAnswers) {
   std::vector<std::future<bool>> answers;
+  answers.reserve(16);
   for (int i = 0; i < 16; ++i) {
     answers.push_back(std::async(std::launch::async, [this, i] {
       Introduction worker = fitting_worker();
