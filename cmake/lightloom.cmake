@@ -13,7 +13,8 @@ if(LIGHTLOOM_SANITIZE)
   add_compile_options(-fsanitize=${LIGHTLOOM_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer -g)
   add_link_options(-fsanitize=${LIGHTLOOM_SANITIZE})
   if(LIGHTLOOM_SANITIZE MATCHES "thread" AND CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
-    add_compile_options(-fsanitize-ignorelist=${PROJECT_SOURCE_DIR}/tests/sanitizers/tsan.ignorelist)
+    # The old spelling of -fsanitize-ignorelist: ccache hashes the contents of the file with this one only.
+    add_compile_options(-fsanitize-blacklist=${PROJECT_SOURCE_DIR}/tests/sanitizers/tsan.ignorelist)
   endif()
 endif()
 

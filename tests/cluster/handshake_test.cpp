@@ -6,6 +6,9 @@
 
 #include <chrono>
 #include <future>
+#include <memory>
+#include <string>
+#include <vector>
 
 #include "bake-server/grpc/server.h"
 #include "bake-worker/join.h"
@@ -74,6 +77,7 @@ TEST_P(Handshake, AWorkerWithoutAvx2IsRefused) {
 
 TEST_P(Handshake, ManyWorkersAtOnceGetTheirOwnAnswers) {
   std::vector<std::future<bool>> answers;
+  answers.reserve(16);
   for (int i = 0; i < 16; ++i) {
     answers.push_back(std::async(std::launch::async, [this, i] {
       Introduction worker = fitting_worker();
@@ -102,10 +106,14 @@ TEST_P(Handshake, TheHealthServiceSaysServing) {
   context.set_deadline(std::chrono::system_clock::now() + kPatience);
   const grpc::ByteBuffer request(nullptr, 0);
   grpc::ByteBuffer response;
-  std::promise<grpc::Status> done;
-  stub.UnaryCall(&context, "/grpc.health.v1.Health/Check", {}, &request, &response,
-                 [&done](grpc::Status status) { done.set_value(std::move(status)); });
-  const grpc::Status status = done.get_future().get();
+  grpc::CompletionQueue queue;
+  const auto call = stub.PrepareUnaryCall(&context, "/grpc.health.v1.Health/Check", request, &queue);
+  call->StartCall();
+  grpc::Status status;
+  call->Finish(&response, &status, nullptr);
+  void* tag = nullptr;
+  bool event_ok = false;
+  ASSERT_TRUE(queue.Next(&tag, &event_ok));
   ASSERT_TRUE(status.ok()) << status.error_message();
   grpc::Slice bytes;
   ASSERT_TRUE(response.DumpToSingleSlice(&bytes).ok());
