@@ -16,6 +16,7 @@ namespace {
 using Cell = std::array<int32_t, 3>;
 
 constexpr int kCandidates = 24;       // fixed points per cell, tried in order
+constexpr float kClearance = 0.15f;   // of the spacing
 constexpr uint32_t kSpaceRays = 24;   // rays that tell open space from solid
 constexpr size_t kTestReceivers = 64; // per cell, for repair
 constexpr uint32_t kTestRaysSide = 4;
@@ -52,19 +53,13 @@ Vec3 candidate(const Cell& cell, float spacing, int n) {
   return p;
 }
 
-/// First acceptable point, asking for less and less clearance.
+/// First acceptable point: in open space, and not so near a surface that it would crowd the neighbouring cells' probes. A
+/// cell of which only slivers are open gets none; repair adds one if it is missed.
 std::optional<Vec3> base_point(const RayTracer& tracer, const Cell& cell, float spacing) {
-  std::array<float, kCandidates> clearance{};  // −1: solid
-  for (const float wanted : {0.15f, 0.06f, 0.02f}) {
-    for (int n = 0; n < kCandidates; ++n) {
-      float& c = clearance[static_cast<size_t>(n)];
-      const Vec3 p = candidate(cell, spacing, n);
-      if (c == 0) {
-        const FirstHits f = look_around(tracer, p);
-        c = f.solid() ? -1 : f.nearest;
-      }
-      if (c >= wanted * spacing) return p;
-    }
+  for (int n = 0; n < kCandidates; ++n) {
+    const Vec3 p = candidate(cell, spacing, n);
+    const FirstHits f = look_around(tracer, p);
+    if (!f.solid() && f.nearest >= kClearance * spacing) return p;
   }
   return std::nullopt;
 }
@@ -164,17 +159,19 @@ absl::StatusOr<PlacementResult> place_probes(const RayTracer& tracer, const Rece
                                              const PlacementOptions& options, const Parallel& parallel) {
   const float spacing = options.spacing;
 
-  // Cells within one cell of a receiver.
+  // Cells with receivers, and cells between two such neighbours: the middle of a room, not the open air around it.
   std::map<Cell, std::vector<uint32_t>> home;
   for (uint32_t r = 0; r < receivers.all.size(); ++r) {
     home[cell_of(receivers.all[r].point.position, spacing)].push_back(r);
   }
   std::set<Cell> near;
   for (const auto& [c, unused] : home) {
-    for (int32_t dx = -1; dx <= 1; ++dx) {
-      for (int32_t dy = -1; dy <= 1; ++dy) {
-        for (int32_t dz = -1; dz <= 1; ++dz) near.insert({c[0] + dx, c[1] + dy, c[2] + dz});
-      }
+    near.insert(c);
+    for (size_t axis = 0; axis < 3; ++axis) {
+      Cell between = c, beyond = c;
+      between[axis] += 1;
+      beyond[axis] += 2;
+      if (home.contains(beyond)) near.insert(between);
     }
   }
 
