@@ -65,7 +65,13 @@ std::optional<Vec3> base_point(const RayTracer& tracer, const Cell& cell, float 
 }
 
 struct Unseen {
-  Vec3 from, to;  // receiver, and what it sees (pushed off)
+  Vec3 from;  // receiver
+  Vec3 to;    // what it sees: a point (pushed off), or a direction to the sky
+  bool sky = false;
+
+  bool seen_from(const RayTracer& tracer, Vec3 probe) const {
+    return sky ? !tracer.occluded(probe, to, std::numeric_limits<float>::infinity()) : tracer.visible(to, probe);
+  }
 };
 
 /// Test rays of the cell's receivers whose hits no probe within reach sees.
@@ -80,15 +86,18 @@ std::vector<Unseen> unseen_hits(const RayTracer& tracer, const Receivers& receiv
     for (uint32_t i = 0; i < kTestRaysSide * kTestRaysSide; ++i) {
       const Sample2 uv = stratified(i, kTestRaysSide, &rng);
       ++*rays;
-      const Hit hit = tracer.closest(receiver.point.position, leave(receiver.point, square_to_cosine_hemisphere(uv.u, uv.v)));
-      if (!hit) continue;
-      const Object& object = scene.objects[hit.object];
-      if (hit.back && !scene.materials[object.triangles[hit.triangle].material].double_sided) continue;
-      const Vec3 y = shading_point(object, hit.triangle, hit.b1, hit.b2, hit.back).position;
+      const Vec3 direction = leave(receiver.point, square_to_cosine_hemisphere(uv.u, uv.v));
+      const Hit hit = tracer.closest(receiver.point.position, direction);
+      Unseen target{receiver.point.position, direction, !hit};
+      if (hit) {
+        const Object& object = scene.objects[hit.object];
+        if (hit.back && !scene.materials[object.triangles[hit.triangle].material].double_sided) continue;
+        target.to = shading_point(object, hit.triangle, hit.b1, hit.b2, hit.back).position;
+      }
       const bool seen = std::any_of(near.begin(), near.end(), [&](const ProbeGrid::Near& n) {
-        return tracer.visible(y, probes[n.probe].position);
+        return target.seen_from(tracer, probes[n.probe].position);
       });
-      if (!seen) out.push_back({receiver.point.position, y});
+      if (!seen) out.push_back(target);
     }
   }
   return out;
@@ -109,7 +118,7 @@ std::vector<Probe> repair(const RayTracer& tracer, const Cell& cell, float spaci
   std::vector<Vec3> points;
   for (const Unseen& u : unseen) {
     for (const float t : {0.3f, 0.7f}) {
-      const Vec3 p = u.from + (u.to - u.from) * t;
+      const Vec3 p = u.from + (u.sky ? u.to * spacing : u.to - u.from) * t;
       if (cell_of(p, spacing) == cell) points.push_back(p);
     }
   }
@@ -129,7 +138,7 @@ std::vector<Probe> repair(const RayTracer& tracer, const Cell& cell, float spaci
   };
   std::vector<std::vector<bool>> sees(points.size());
   for (size_t i = 0; i < points.size(); ++i) {
-    for (const Unseen& u : unseen) sees[i].push_back(tracer.visible(u.to, points[i]));
+    for (const Unseen& u : unseen) sees[i].push_back(u.seen_from(tracer, points[i]));
   }
   std::vector<Probe> out;
   std::vector<bool> covered(unseen.size(), false);

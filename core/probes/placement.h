@@ -29,7 +29,7 @@ struct PlacementOptions {
 
 struct PlacementResult {
   std::vector<Probe> probes;  ///< sorted by key
-  double unseen = 0;          ///< share of test rays whose hit no base probe in reach sees: what repair starts from
+  double unseen = 0;          ///< share of test rays whose hit, or sky, no base probe in reach sees: what repair starts from
   size_t repairs = 0;         ///< probes added by repair
 };
 absl::StatusOr<PlacementResult> place_probes(const RayTracer& tracer, const Receivers& receivers,
