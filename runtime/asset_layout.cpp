@@ -23,7 +23,9 @@ uint32_t jobs_of(uint32_t rank) { return std::max(1u, (rank + gpu::kJobColumns -
 uint64_t section_bytes(size_t section, uint64_t elements) {
   return std::max<uint64_t>(16, elements * kElementBytes[section]);
 }
-uint64_t aligned(uint64_t bytes) { return (bytes + kSectionAlignment - 1) / kSectionAlignment * kSectionAlignment; }
+uint64_t aligned(uint64_t bytes) {
+  return (bytes + kSectionAlignment - 1) / kSectionAlignment * kSectionAlignment;
+}
 
 template <class T>
 void append(std::vector<T>* to, const std::vector<T>& from) {
@@ -87,7 +89,8 @@ void PageBuilder::add(const SourceCell& cell) {
     for (const uint32_t p : c.probes) probes_.push_back(cell.probes[p]);
     append(&corrections_, c.correction);
     for (uint32_t o = 0; o < record.octets; ++o) octets_.push_back({index, o});
-    const auto first = static_cast<int64_t>(c.first_receiver), last = first + static_cast<int64_t>(c.receivers);
+    const auto first = static_cast<int64_t>(c.first_receiver),
+               last = first + static_cast<int64_t>(c.receivers);
     elements_.insert(elements_.end(), cell.elements.begin() + first, cell.elements.begin() + last);
     elements_.resize(octets_.size() * gpu::kOctet, gpu::kNoElement);
     uniforms_.insert(uniforms_.end(), cell.chunk.uniform.begin() + first, cell.chunk.uniform.begin() + last);
@@ -109,9 +112,9 @@ std::vector<uint8_t> PageBuilder::take(PageLayout* layout) {
   layout->projection_bytes = projection_bytes_;
   layout->reconstruction_bytes = reconstruction_bytes_;
 
-  const std::array<const void*, kPageSections> data = {clusters_.data(), jobs_.data(),     probes_.data(),
+  const std::array<const void*, kPageSections> data = {clusters_.data(),    jobs_.data(),   probes_.data(),
                                                        corrections_.data(), octets_.data(), elements_.data(),
-                                                       uniforms_.data(), matrix_.data()};
+                                                       uniforms_.data(),    matrix_.data()};
   std::vector<uint8_t> bytes(layout->bytes);
   uint64_t at = 0;
   for (size_t s = 0; s < kPageSections; ++s) {
@@ -127,9 +130,11 @@ std::vector<uint8_t> PageBuilder::take(PageLayout* layout) {
 
 std::vector<float> sh_table(uint32_t order, uint32_t rays) {
   const size_t stride = static_cast<size_t>(sh_stride(static_cast<int>(order)));
-  std::vector<float> table(rays * stride);
+  const size_t padded = (size_t{rays} + gpu::kRayTile - 1) / gpu::kRayTile * gpu::kRayTile;
+  std::vector<float> table(padded * stride), y(stride);
   for (uint32_t r = 0; r < rays; ++r) {
-    sh_evaluate(static_cast<int>(order), sphere_direction(r, rays), std::span(table).subspan(r * stride, stride));
+    sh_evaluate(static_cast<int>(order), sphere_direction(r, rays), y);
+    for (size_t j = 0; j < stride; ++j) table[(r / 4 * stride + j) * 4 + r % 4] = y[j];
   }
   return table;
 }

@@ -1,4 +1,5 @@
-// A .loom asset as the GPU reads it: bake cells packed into pages, each one buffer of typed sections (shaders/layout.h).
+// A .loom asset as the GPU reads it: bake cells packed into pages, each one buffer of typed sections
+// (shaders/layout.h).
 #pragma once
 
 #include <array>
@@ -64,7 +65,8 @@ class PageBuilder {
   uint64_t projection_bytes_ = 0, reconstruction_bytes_ = 0;
 };
 
-/// Y_j(ω_r), ray after ray with rows of sh_stride(order), padding 0.
+/// Y_j(ω_r) for the relight pass: [r/4][j][r%4], j < sh_stride(order), r up to a multiple of gpu::kRayTile;
+/// padding 0.
 std::vector<float> sh_table(uint32_t order, uint32_t rays);
 
 }  // namespace lightloom

@@ -1,4 +1,5 @@
-// An asset read chunk by chunk through a caller's function, everything checked, texels resolved to surface elements.
+// An asset read chunk by chunk through a caller's function, everything checked, texels resolved to surface
+// elements.
 #pragma once
 
 #include <cstdint>
@@ -21,13 +22,16 @@ struct SourceCell {
   std::vector<uint32_t> probes;    ///< the cell's probe list: indices into Manifest::probes
 };
 
-/// Marks the cell's receivers in `received` (S). DataLoss if one is marked already: no two receivers may share an E.
+/// Marks the cell's receivers in `received` (S). DataLoss if one is marked already: no two receivers may
+/// share an E.
 absl::Status mark_receivers(uint32_t index, const SourceCell& cell, std::vector<bool>* received);
 
-/// Surface elements are numbered 0..S-1: objects in manifest order, the keys of each object's surface chunk ascending.
+/// Surface elements are numbered 0..S-1: objects in manifest order, the keys of each object's surface chunk
+/// ascending.
 class AssetSource {
  public:
-  /// Reads the manifest and every surface chunk. DataLoss: corrupt; Unimplemented: newer, or beyond this reader's limits.
+  /// Reads the manifest and every surface chunk. DataLoss: corrupt; Unimplemented: newer, or beyond this
+  /// reader's limits.
   static absl::StatusOr<AssetSource> open(std::span<const uint8_t> manifest, ReadChunk read);
 
   const Manifest& manifest() const { return manifest_; }

@@ -1,5 +1,5 @@
-// Silvennoinen & Lehtinen, "Real-time Global Illumination by Precomputed Local Reconstruction from Sparse Radiance
-// Probes", SIGGRAPH Asia 2017: relighting (Sec. 4.1) and the compressed cluster transport of Eq. 11.
+// Silvennoinen & Lehtinen, "Real-time Global Illumination by Precomputed Local Reconstruction from Sparse
+// Radiance Probes", SIGGRAPH Asia 2017: relighting (Sec. 4.1) and the compressed cluster transport of Eq. 11.
 #include "runtime/decoder.h"
 
 #include <array>
@@ -97,8 +97,8 @@ absl::StatusOr<DecoderAsset> load_decoder_asset(const AssetSource& source) {
   return asset;
 }
 
-DecodedFrame decode_frame(const DecoderAsset& asset, const SurfaceLight& light, std::span<const Vec3> previous,
-                          const Parallel& how) {
+DecodedFrame decode_frame(const DecoderAsset& asset, const SurfaceLight& light,
+                          std::span<const Vec3> previous, const Parallel& how) {
   const size_t S = asset.surface_elements;
   LL_CHECK(light.direct.size() == S && light.albedo.size() == S && light.emission.size() == S);
   LL_CHECK(previous.size() == S);
@@ -115,7 +115,8 @@ DecodedFrame decode_frame(const DecoderAsset& asset, const SurfaceLight& light, 
   const size_t N = asset.relight.empty() ? 0 : asset.relight[0].size();
   std::vector<float> sh(N * J);
   for (size_t r = 0; r < N; ++r) {
-    sh_evaluate(static_cast<int>(asset.order), sphere_direction(static_cast<uint32_t>(r), static_cast<uint32_t>(N)),
+    sh_evaluate(static_cast<int>(asset.order),
+                sphere_direction(static_cast<uint32_t>(r), static_cast<uint32_t>(N)),
                 std::span(sh).subspan(r * J, J));
   }
   frame.lambda.resize(asset.relight.size() * J);

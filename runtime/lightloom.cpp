@@ -21,17 +21,28 @@ namespace {
 /// Which status code stands for which result, in all of runtime/ and in core/asset.
 lightloom_result result_of(const absl::Status& status) {
   switch (status.code()) {
-    case absl::StatusCode::kOk: return LIGHTLOOM_OK;
-    case absl::StatusCode::kInvalidArgument: return LIGHTLOOM_ERROR_INVALID_ARGUMENT;
-    case absl::StatusCode::kNotFound: return LIGHTLOOM_ERROR_NO_DEVICE;
-    case absl::StatusCode::kOutOfRange: return LIGHTLOOM_ERROR_MISSING_FEATURE;
-    case absl::StatusCode::kResourceExhausted: return LIGHTLOOM_ERROR_OUT_OF_MEMORY;
-    case absl::StatusCode::kDataLoss: return LIGHTLOOM_ERROR_CORRUPT_ASSET;
-    case absl::StatusCode::kUnimplemented: return LIGHTLOOM_ERROR_UNSUPPORTED_ASSET;
-    case absl::StatusCode::kAborted: return LIGHTLOOM_ERROR_READ_FAILED;
-    case absl::StatusCode::kFailedPrecondition: return LIGHTLOOM_ERROR_NO_ASSET;
-    case absl::StatusCode::kUnavailable: return LIGHTLOOM_ERROR_DEVICE_LOST;
-    default: return LIGHTLOOM_ERROR_INTERNAL;
+    case absl::StatusCode::kOk:
+      return LIGHTLOOM_OK;
+    case absl::StatusCode::kInvalidArgument:
+      return LIGHTLOOM_ERROR_INVALID_ARGUMENT;
+    case absl::StatusCode::kNotFound:
+      return LIGHTLOOM_ERROR_NO_DEVICE;
+    case absl::StatusCode::kOutOfRange:
+      return LIGHTLOOM_ERROR_MISSING_FEATURE;
+    case absl::StatusCode::kResourceExhausted:
+      return LIGHTLOOM_ERROR_OUT_OF_MEMORY;
+    case absl::StatusCode::kDataLoss:
+      return LIGHTLOOM_ERROR_CORRUPT_ASSET;
+    case absl::StatusCode::kUnimplemented:
+      return LIGHTLOOM_ERROR_UNSUPPORTED_ASSET;
+    case absl::StatusCode::kAborted:
+      return LIGHTLOOM_ERROR_READ_FAILED;
+    case absl::StatusCode::kFailedPrecondition:
+      return LIGHTLOOM_ERROR_NO_ASSET;
+    case absl::StatusCode::kUnavailable:
+      return LIGHTLOOM_ERROR_DEVICE_LOST;
+    default:
+      return LIGHTLOOM_ERROR_INTERNAL;
   }
 }
 
@@ -120,17 +131,28 @@ extern "C" {
 
 const char* lightloom_result_string(lightloom_result result) {
   switch (result) {
-    case LIGHTLOOM_OK: return "ok";
-    case LIGHTLOOM_ERROR_INVALID_ARGUMENT: return "invalid argument";
-    case LIGHTLOOM_ERROR_NO_DEVICE: return "no Vulkan device";
-    case LIGHTLOOM_ERROR_MISSING_FEATURE: return "the device or a layer lacks a feature";
-    case LIGHTLOOM_ERROR_OUT_OF_MEMORY: return "out of memory";
-    case LIGHTLOOM_ERROR_CORRUPT_ASSET: return "corrupt asset";
-    case LIGHTLOOM_ERROR_UNSUPPORTED_ASSET: return "unsupported asset";
-    case LIGHTLOOM_ERROR_READ_FAILED: return "a chunk could not be read";
-    case LIGHTLOOM_ERROR_NO_ASSET: return "no asset is loaded";
-    case LIGHTLOOM_ERROR_DEVICE_LOST: return "device lost";
-    case LIGHTLOOM_ERROR_INTERNAL: return "internal error";
+    case LIGHTLOOM_OK:
+      return "ok";
+    case LIGHTLOOM_ERROR_INVALID_ARGUMENT:
+      return "invalid argument";
+    case LIGHTLOOM_ERROR_NO_DEVICE:
+      return "no Vulkan device";
+    case LIGHTLOOM_ERROR_MISSING_FEATURE:
+      return "the device or a layer lacks a feature";
+    case LIGHTLOOM_ERROR_OUT_OF_MEMORY:
+      return "out of memory";
+    case LIGHTLOOM_ERROR_CORRUPT_ASSET:
+      return "corrupt asset";
+    case LIGHTLOOM_ERROR_UNSUPPORTED_ASSET:
+      return "unsupported asset";
+    case LIGHTLOOM_ERROR_READ_FAILED:
+      return "a chunk could not be read";
+    case LIGHTLOOM_ERROR_NO_ASSET:
+      return "no asset is loaded";
+    case LIGHTLOOM_ERROR_DEVICE_LOST:
+      return "device lost";
+    case LIGHTLOOM_ERROR_INTERNAL:
+      return "internal error";
   }
   return "unknown result";
 }
@@ -142,13 +164,15 @@ uint32_t lightloom_version(void) {
 lightloom_result lightloom_create(const lightloom_create_info* info, lightloom_runtime** out) {
   if (out == nullptr) return LIGHTLOOM_ERROR_INVALID_ARGUMENT;
   *out = nullptr;
-  if (info == nullptr || info->struct_size < sizeof(lightloom_create_info)) return LIGHTLOOM_ERROR_INVALID_ARGUMENT;
+  if (info == nullptr || info->struct_size < sizeof(lightloom_create_info))
+    return LIGHTLOOM_ERROR_INVALID_ARGUMENT;
   lightloom::RuntimeOptions options;
   options.messages = {info->message, info->message_user};
   return guarded(options.messages, [&]() -> absl::Status {
     constexpr uint32_t kKnown = LIGHTLOOM_CREATE_VALIDATION | LIGHTLOOM_CREATE_FORCE_STAGING;
     if ((info->flags & ~kKnown) != 0 || info->reserved != 0) {
-      return absl::InvalidArgumentError("lightloom_create_info has unknown flags or a reserved field that is not 0");
+      return absl::InvalidArgumentError(
+          "lightloom_create_info has unknown flags or a reserved field that is not 0");
     }
     options.validation = (info->flags & LIGHTLOOM_CREATE_VALIDATION) != 0;
     options.force_staging = (info->flags & LIGHTLOOM_CREATE_FORCE_STAGING) != 0;
@@ -168,7 +192,8 @@ lightloom_result lightloom_load(lightloom_runtime* runtime, const lightloom_asse
   return guarded(runtime->impl->messages(), [&]() -> absl::Status {
     if (info == nullptr || info->struct_size < sizeof(lightloom_asset_info) || info->manifest == nullptr ||
         info->read_chunk == nullptr || info->reserved != 0) {
-      return absl::InvalidArgumentError("lightloom_asset_info is null, its struct_size is wrong or a field is missing");
+      return absl::InvalidArgumentError(
+          "lightloom_asset_info is null, its struct_size is wrong or a field is missing");
     }
     const auto read = [info](const lightloom::ChunkRef& ref, std::span<uint8_t> bytes) -> absl::Status {
       if (info->read_chunk(info->read_user, ref.digest.bytes.data(), ref.size, bytes.data()) == 0) {
@@ -187,8 +212,8 @@ void lightloom_unload(lightloom_runtime* runtime) {
 lightloom_result lightloom_get_counts(const lightloom_runtime* runtime, lightloom_counts* counts) {
   return with_asset(runtime, [&](const lightloom::Runtime& r) {
     const auto& c = r.asset()->counts();
-    return lightloom::fill(lightloom_counts{sizeof(lightloom_counts), c.surface_elements, c.receivers, c.probes,
-                                            c.cells, c.clusters, c.pages, c.order, c.gpu_bytes},
+    return lightloom::fill(lightloom_counts{sizeof(lightloom_counts), c.surface_elements, c.receivers,
+                                            c.probes, c.cells, c.clusters, c.pages, c.order, c.gpu_bytes},
                            counts);
   });
 }
@@ -233,9 +258,10 @@ lightloom_result lightloom_get_stats(const lightloom_runtime* runtime, lightloom
     const auto& s = r.stats();
     const auto& c = r.asset()->counts();
     const auto& ms = s.milliseconds;
-    return lightloom::fill(lightloom_stats{sizeof(lightloom_stats), s.frames, s.timestamps ? 1u : 0u, 0, ms[0], ms[1],
-                                           ms[2], ms[3], c.relight_bytes, c.project_bytes, c.receive_bytes},
-                           stats);
+    return lightloom::fill(
+        lightloom_stats{sizeof(lightloom_stats), s.frames, s.timestamps ? 1u : 0u, 0, ms[0], ms[1], ms[2],
+                        ms[3], c.relight_bytes, c.project_bytes, c.receive_bytes},
+        stats);
   });
 }
 

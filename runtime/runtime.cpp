@@ -49,12 +49,14 @@ absl::Status Runtime::load(std::span<const uint8_t> manifest, ReadChunk read) {
   unload();
   stats_ = {};
   LL_ASSIGN_OR_RETURN(const AssetSource source, AssetSource::open(manifest, std::move(read)));
-  LL_ASSIGN_OR_RETURN(asset_, GpuAsset::load(device_.get(), transfer_.get(), pipelines_.get(), source, limits_));
+  LL_ASSIGN_OR_RETURN(asset_,
+                      GpuAsset::load(device_.get(), transfer_.get(), pipelines_.get(), source, limits_));
   return absl::OkStatus();
 }
 
 absl::Status Runtime::set(SurfaceArray array, std::span<const float> rgb) {
-  return transfer_->upload(asset_->array(array), {reinterpret_cast<const uint8_t*>(rgb.data()), rgb.size_bytes()});
+  return transfer_->upload(asset_->array(array),
+                           {reinterpret_cast<const uint8_t*>(rgb.data()), rgb.size_bytes()});
 }
 
 absl::Status Runtime::update(uint32_t iterations) {
@@ -79,10 +81,10 @@ absl::Status Runtime::add_times(uint32_t frames, Stats* stats) const {
   if (queries_ == VK_NULL_HANDLE) return absl::OkStatus();
   std::array<uint64_t, kFramesPerSubmit * kQueriesPerFrame> ticks;
   const uint32_t count = frames * kQueriesPerFrame;
-  LL_VK_RETURN_IF_ERROR("vkGetQueryPoolResults",
-                        vkGetQueryPoolResults(device_->handle(), queries_, 0, count, count * sizeof(uint64_t),
-                                              ticks.data(), sizeof(uint64_t),
-                                              VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT));
+  LL_VK_RETURN_IF_ERROR(
+      "vkGetQueryPoolResults",
+      vkGetQueryPoolResults(device_->handle(), queries_, 0, count, count * sizeof(uint64_t), ticks.data(),
+                            sizeof(uint64_t), VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT));
   const uint32_t bits = device_->timestamp_bits();
   const uint64_t mask = bits >= 64 ? ~uint64_t{0} : (uint64_t{1} << bits) - 1;
   const double to_ms = static_cast<double>(device_->limits().timestampPeriod) * 1e-6;

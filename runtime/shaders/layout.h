@@ -13,8 +13,9 @@ using uint = uint32_t;
 
 /// Invocations of every workgroup.
 LL_CONSTANT uint kGroup = 64u;
-/// Rays whose radiance one workgroup of the relight pass keeps in shared memory at a time.
-LL_CONSTANT uint kRayTile = 256u;
+/// Probes of one workgroup of the relight pass, and their rays that it keeps in shared memory at a time.
+LL_CONSTANT uint kRelightProbes = 4u;
+LL_CONSTANT uint kRayTile = 64u;
 /// Columns of a cluster that one workgroup of the project pass computes.
 LL_CONSTANT uint kJobColumns = 8u;
 /// Receivers of one octet, the halfs of a uvec4.
@@ -56,7 +57,7 @@ struct RelightPush {
   float sky_r, sky_g, sky_b;
   float scale;        // 4π/N
   uint rays;          // N
-  uint stride4;       // sh_stride / 4
+  uint stride8;       // sh_stride / 8
   uint first_probe;   // of this page
   uint probes;        // in this page
 };

@@ -45,7 +45,8 @@ absl::Status flush(Device* device, const Buffer& b, uint64_t size) {
 absl::Status invalidate(Device* device, const Buffer& b, uint64_t size) {
   if (b.coherent) return absl::OkStatus();
   const auto range = atoms(b, size, device->limits().nonCoherentAtomSize);
-  return vulkan_status(vkInvalidateMappedMemoryRanges(device->handle(), 1, &range), "vkInvalidateMappedMemoryRanges");
+  return vulkan_status(vkInvalidateMappedMemoryRanges(device->handle(), 1, &range),
+                       "vkInvalidateMappedMemoryRanges");
 }
 
 }  // namespace
@@ -58,13 +59,14 @@ Arena::~Arena() {
 absl::StatusOr<Buffer> Arena::buffer(uint64_t size) {
   size = std::max<uint64_t>(size, 16);
   if (size > device_->limits().maxStorageBufferRange) {
-    return absl::UnimplementedError("asset needs a buffer of " + std::to_string(size) +
-                                    " bytes, this device binds at most " +
-                                    std::to_string(device_->limits().maxStorageBufferRange) + "; bake it coarser");
+    return absl::UnimplementedError(
+        "asset needs a buffer of " + std::to_string(size) + " bytes, this device binds at most " +
+        std::to_string(device_->limits().maxStorageBufferRange) + "; bake it coarser");
   }
   auto info = vulkan_struct<VkBufferCreateInfo>(VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO);
   info.size = size;
-  info.usage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
+  info.usage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT |
+               VK_BUFFER_USAGE_TRANSFER_DST_BIT;
   info.sharingMode = VK_SHARING_MODE_EXCLUSIVE;
   VkBuffer handle = VK_NULL_HANDLE;
   buffers_.reserve(buffers_.size() + 1);
@@ -75,7 +77,8 @@ absl::StatusOr<Buffer> Arena::buffer(uint64_t size) {
   vkGetBufferMemoryRequirements(device_->handle(), handle, &need);
   LL_ASSIGN_OR_RETURN(Block* const block, block_for(need));
   const uint64_t offset = (block->used + need.alignment - 1) / need.alignment * need.alignment;
-  LL_VK_RETURN_IF_ERROR("vkBindBufferMemory", vkBindBufferMemory(device_->handle(), handle, block->memory, offset));
+  LL_VK_RETURN_IF_ERROR("vkBindBufferMemory",
+                        vkBindBufferMemory(device_->handle(), handle, block->memory, offset));
   block->used = offset + need.size;
   bytes_ += need.size;
 
@@ -111,7 +114,8 @@ absl::StatusOr<Arena::Block*> Arena::block_for(const VkMemoryRequirements& need)
   info.allocationSize = use_ == MemoryUse::kStaging ? need.size : std::max(need.size, kBlockBytes);
   Block block{VK_NULL_HANDLE, info.allocationSize, 0, info.memoryTypeIndex, nullptr};
   blocks_.reserve(blocks_.size() + 1);
-  LL_VK_RETURN_IF_ERROR("vkAllocateMemory", vkAllocateMemory(device_->handle(), &info, nullptr, &block.memory));
+  LL_VK_RETURN_IF_ERROR("vkAllocateMemory",
+                        vkAllocateMemory(device_->handle(), &info, nullptr, &block.memory));
   blocks_.push_back(block);
   const auto flags = device_->memory().memoryTypes[type].propertyFlags;
   if (use_ != MemoryUse::kDeviceUnmapped && (flags & VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT) != 0) {

@@ -15,17 +15,17 @@ namespace lightloom {
 /// Owned by its arena.
 struct Buffer {
   VkBuffer handle = VK_NULL_HANDLE;
-  uint64_t size = 0;                      ///< bytes
+  uint64_t size = 0;  ///< bytes
   VkDeviceMemory memory = VK_NULL_HANDLE;
   uint64_t memory_offset = 0, memory_size = 0;  ///< where it lies, and the size of the whole allocation
-  uint8_t* mapped = nullptr;              ///< null: the host must copy through staging
+  uint8_t* mapped = nullptr;                    ///< null: the host must copy through staging
   bool coherent = false, cached = false;
 };
 
 enum class MemoryUse {
-  kDevice,         ///< device local; mapped if the device's memory happens to be host visible
-  kDeviceUnmapped, ///< never mapped
-  kStaging,        ///< host visible, cached where there is such a type
+  kDevice,          ///< device local; mapped if the device's memory happens to be host visible
+  kDeviceUnmapped,  ///< never mapped
+  kStaging,         ///< host visible, cached where there is such a type
 };
 
 /// Allocates memory in blocks and buffers within them; all are freed together, with the arena.
@@ -36,7 +36,8 @@ class Arena {
   Arena(const Arena&) = delete;
   Arena& operator=(const Arena&) = delete;
 
-  /// A storage buffer that can be copied from and to. ResourceExhausted; Unimplemented if it exceeds what a shader can bind.
+  /// A storage buffer that can be copied from and to. ResourceExhausted; Unimplemented if it exceeds what a
+  /// shader can bind.
   absl::StatusOr<Buffer> buffer(uint64_t size);
   /// Sum of the buffers, without the slack of the blocks.
   uint64_t bytes() const { return bytes_; }

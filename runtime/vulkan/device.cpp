@@ -24,7 +24,8 @@ VKAPI_ATTR VkBool32 VKAPI_CALL on_message(VkDebugUtilsMessageSeverityFlagBitsEXT
 }
 
 VkDebugUtilsMessengerCreateInfoEXT messenger_info(Messages* messages) {
-  auto info = vulkan_struct<VkDebugUtilsMessengerCreateInfoEXT>(VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT);
+  auto info = vulkan_struct<VkDebugUtilsMessengerCreateInfoEXT>(
+      VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT);
   info.messageSeverity =
       VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT;
   // Not GENERAL: there the loader complains about drivers that we do not use.
@@ -49,10 +50,14 @@ int rank_device(VkPhysicalDevice physical, uint32_t* family, uint32_t* timestamp
   *family = static_cast<uint32_t>(it - families.begin());
   *timestamp_bits = it->timestampValidBits;
   switch (properties.deviceType) {
-    case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU: return 0;
-    case VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU: return 1;
-    case VK_PHYSICAL_DEVICE_TYPE_VIRTUAL_GPU: return 2;
-    default: return 3;
+    case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU:
+      return 0;
+    case VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU:
+      return 1;
+    case VK_PHYSICAL_DEVICE_TYPE_VIRTUAL_GPU:
+      return 2;
+    default:
+      return 3;
   }
 }
 
@@ -77,15 +82,17 @@ void memory_barrier(VkCommandBuffer commands, VkPipelineStageFlags from_stage, V
 
 void barrier_between_passes(VkCommandBuffer commands) {
   memory_barrier(commands, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_ACCESS_SHADER_WRITE_BIT,
-                 VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT);
+                 VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT,
+                 VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT);
 }
 
 void barrier_to_all(VkCommandBuffer commands) {
-  memory_barrier(commands, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT,
-                 VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_WRITE_BIT,
-                 VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT | VK_PIPELINE_STAGE_HOST_BIT,
-                 VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_READ_BIT |
-                     VK_ACCESS_TRANSFER_WRITE_BIT | VK_ACCESS_HOST_READ_BIT);
+  memory_barrier(
+      commands, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT,
+      VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_WRITE_BIT,
+      VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT | VK_PIPELINE_STAGE_HOST_BIT,
+      VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_READ_BIT |
+          VK_ACCESS_TRANSFER_WRITE_BIT | VK_ACCESS_HOST_READ_BIT);
 }
 
 absl::StatusOr<std::unique_ptr<Device>> Device::create(bool validation, Messages messages) {
@@ -99,14 +106,16 @@ absl::StatusOr<std::unique_ptr<Device>> Device::create(bool validation, Messages
 
 absl::Status Device::create_instance(bool validation) {
   if (validation && !has_validation_layer()) {
-    return absl::OutOfRangeError(std::string(kValidationLayer) +
-                                 " is not installed; install vulkan-validationlayers or create without validation");
+    return absl::OutOfRangeError(
+        std::string(kValidationLayer) +
+        " is not installed; install vulkan-validationlayers or create without validation");
   }
   auto application = vulkan_struct<VkApplicationInfo>(VK_STRUCTURE_TYPE_APPLICATION_INFO);
   application.pEngineName = "lightloom";
   application.apiVersion = VK_API_VERSION_1_1;
 
-  const VkValidationFeatureEnableEXT enables[] = {VK_VALIDATION_FEATURE_ENABLE_SYNCHRONIZATION_VALIDATION_EXT};
+  const VkValidationFeatureEnableEXT enables[] = {
+      VK_VALIDATION_FEATURE_ENABLE_SYNCHRONIZATION_VALIDATION_EXT};
   auto features = vulkan_struct<VkValidationFeaturesEXT>(VK_STRUCTURE_TYPE_VALIDATION_FEATURES_EXT);
   features.enabledValidationFeatureCount = 1;
   features.pEnabledValidationFeatures = enables;
@@ -129,7 +138,8 @@ absl::Status Device::create_instance(bool validation) {
   const auto create = reinterpret_cast<PFN_vkCreateDebugUtilsMessengerEXT>(
       vkGetInstanceProcAddr(instance_, "vkCreateDebugUtilsMessengerEXT"));
   messenger.pNext = nullptr;
-  LL_VK_RETURN_IF_ERROR("vkCreateDebugUtilsMessengerEXT", create(instance_, &messenger, nullptr, &messenger_));
+  LL_VK_RETURN_IF_ERROR("vkCreateDebugUtilsMessengerEXT",
+                        create(instance_, &messenger, nullptr, &messenger_));
   return absl::OkStatus();
 }
 
@@ -159,10 +169,11 @@ absl::Status Device::pick_physical_device() {
   vkGetPhysicalDeviceProperties(physical_, &properties_);
   vkGetPhysicalDeviceMemoryProperties(physical_, &memory_);
   const VkPhysicalDeviceLimits& l = properties_.limits;
-  if (l.maxPerStageDescriptorStorageBuffers < kStorageBuffers || l.maxComputeWorkGroupInvocations < gpu::kGroup ||
-      l.maxComputeSharedMemorySize < kSharedBytes) {
-    return absl::OutOfRangeError(std::string("device '") + properties_.deviceName +
-                                 "' lacks 7 storage buffers per stage, workgroups of 64 or 12 KiB of shared memory");
+  if (l.maxPerStageDescriptorStorageBuffers < kStorageBuffers ||
+      l.maxComputeWorkGroupInvocations < gpu::kGroup || l.maxComputeSharedMemorySize < kSharedBytes) {
+    return absl::OutOfRangeError(
+        std::string("device '") + properties_.deviceName +
+        "' lacks 7 storage buffers per stage, workgroups of 64 or 12 KiB of shared memory");
   }
   return absl::OkStatus();
 }

@@ -1,4 +1,5 @@
-// A Vulkan instance, device and compute queue, and the one command buffer that is recorded, submitted and waited for.
+// A Vulkan instance, device and compute queue, and the one command buffer that is recorded, submitted and
+// waited for.
 #pragma once
 
 #include <vulkan/vulkan.h>
@@ -25,7 +26,8 @@ class Device {
   /// 0: the queue has no time stamps.
   uint32_t timestamp_bits() const { return timestamp_bits_; }
 
-  /// Records commands, submits them and waits until they are done. Commands must end with barrier_to_all() if they wrote.
+  /// Records commands, submits them and waits until they are done. Commands must end with barrier_to_all() if
+  /// they wrote.
   absl::Status run(const std::function<void(VkCommandBuffer)>& record);
 
  private:
@@ -48,9 +50,11 @@ class Device {
   VkFence fence_ = VK_NULL_HANDLE;
 };
 
-/// What compute shaders wrote becomes visible to the next dispatches, which also wait for what they overwrite.
+/// What compute shaders wrote becomes visible to the next dispatches, which also wait for what they
+/// overwrite.
 void barrier_between_passes(VkCommandBuffer commands);
-/// What shaders or copies wrote becomes visible to everything after: shaders, copies, and the host once it has waited.
+/// What shaders or copies wrote becomes visible to everything after: shaders, copies, and the host once it
+/// has waited.
 void barrier_to_all(VkCommandBuffer commands);
 
 }  // namespace lightloom

@@ -20,8 +20,8 @@ uint64_t groups_of(uint64_t invocations) { return (invocations + gpu::kGroup - 1
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<GpuAsset>> GpuAsset::load(Device* device, Transfer* transfer,
-                                                         const Pipelines* pipelines, const AssetSource& source,
-                                                         const GpuLimits& limits) {
+                                                         const Pipelines* pipelines,
+                                                         const AssetSource& source, const GpuLimits& limits) {
   std::unique_ptr<GpuAsset> asset(new GpuAsset(device, transfer, pipelines, limits));
   const Manifest& m = source.manifest();
   asset->counts_.surface_elements = source.surface_elements();
@@ -101,7 +101,8 @@ absl::Status GpuAsset::finish_page(PageBuilder* builder) {
   Page page;
   const std::vector<uint8_t> bytes = builder->take(&page.layout);
   LL_ASSIGN_OR_RETURN(page.data, arena_.buffer(bytes.size()));
-  LL_ASSIGN_OR_RETURN(page.coefficients, arena_.buffer(uint64_t{page.layout.coefficients} * 4 * sizeof(float)));
+  LL_ASSIGN_OR_RETURN(page.coefficients,
+                      arena_.buffer(uint64_t{page.layout.coefficients} * 4 * sizeof(float)));
   LL_RETURN_IF_ERROR(transfer_->upload(page.data, bytes));
   counts_.project_bytes += page.layout.projection_bytes;
   counts_.receive_bytes += page.layout.reconstruction_bytes;
@@ -116,9 +117,9 @@ absl::Status GpuAsset::create_sets() {
   passes.insert(passes.end(), pages_.size(), Pass::kReceive);
   LL_ASSIGN_OR_RETURN(sets_, DescriptorSets::create(device_, passes));
 
-  const VkDescriptorBufferInfo radiosity[] = {whole(array(SurfaceArray::kDirect)), whole(array(SurfaceArray::kAlbedo)),
-                                              whole(array(SurfaceArray::kEmission)),
-                                              whole(array(SurfaceArray::kIrradiance)), whole(radiosity_)};
+  const VkDescriptorBufferInfo radiosity[] = {
+      whole(array(SurfaceArray::kDirect)), whole(array(SurfaceArray::kAlbedo)),
+      whole(array(SurfaceArray::kEmission)), whole(array(SurfaceArray::kIrradiance)), whole(radiosity_)};
   LL_ASSIGN_OR_RETURN(radiosity_set_, sets_->set(*pipelines_, Pass::kRadiosity, radiosity));
   for (RelightPage& p : relight_pages_) {
     const VkDescriptorBufferInfo relight[] = {whole(p.rays), whole(radiosity_), whole(sh_), whole(lambda_)};
@@ -128,13 +129,18 @@ absl::Status GpuAsset::create_sets() {
     const auto section = [&p](PageSection s) {
       return VkDescriptorBufferInfo{p.data.handle, p.layout[s].offset, p.layout[s].size};
     };
-    const VkDescriptorBufferInfo project[] = {
-        section(PageSection::kClusters), section(PageSection::kJobs),   section(PageSection::kProbes),
-        section(PageSection::kCorrections), section(PageSection::kMatrix), whole(lambda_), whole(p.coefficients)};
+    const VkDescriptorBufferInfo project[] = {section(PageSection::kClusters),
+                                              section(PageSection::kJobs),
+                                              section(PageSection::kProbes),
+                                              section(PageSection::kCorrections),
+                                              section(PageSection::kMatrix),
+                                              whole(lambda_),
+                                              whole(p.coefficients)};
     LL_ASSIGN_OR_RETURN(p.project, sets_->set(*pipelines_, Pass::kProject, project));
     const VkDescriptorBufferInfo receive[] = {
-        section(PageSection::kClusters), section(PageSection::kOctets), section(PageSection::kElements),
-        section(PageSection::kUniforms), section(PageSection::kMatrix), whole(p.coefficients),
+        section(PageSection::kClusters),        section(PageSection::kOctets),
+        section(PageSection::kElements),        section(PageSection::kUniforms),
+        section(PageSection::kMatrix),          whole(p.coefficients),
         whole(array(SurfaceArray::kIrradiance))};
     LL_ASSIGN_OR_RETURN(p.receive, sets_->set(*pipelines_, Pass::kReceive, receive));
   }
@@ -149,10 +155,11 @@ void GpuAsset::dispatch_relight(VkCommandBuffer commands) const {
     push.sky_b = environment_.z;
     push.scale = static_cast<float>(4 * 3.14159265358979323846 / rays_);
     push.rays = rays_;
-    push.stride4 = stride_ / 4;
+    push.stride8 = stride_ / 8;
     push.first_probe = page.first_probe;
     push.probes = page.probes;
-    pipelines_->dispatch(commands, Pass::kRelight, page.set, push, page.probes, limits_.max_groups);
+    const uint32_t groups = (page.probes + gpu::kRelightProbes - 1) / gpu::kRelightProbes;
+    pipelines_->dispatch(commands, Pass::kRelight, page.set, push, groups, limits_.max_groups);
   }
 }
 
@@ -162,8 +169,9 @@ void GpuAsset::record_frame(VkCommandBuffer commands, VkQueryPool queries, uint3
     vkCmdWriteTimestamp(commands, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, queries, first_query + n);
   };
   timestamp(0);
-  pipelines_->dispatch(commands, Pass::kRadiosity, radiosity_set_, gpu::RadiosityPush{counts_.surface_elements},
-                       groups_of(counts_.surface_elements), limits_.max_groups);
+  pipelines_->dispatch(commands, Pass::kRadiosity, radiosity_set_,
+                       gpu::RadiosityPush{counts_.surface_elements}, groups_of(counts_.surface_elements),
+                       limits_.max_groups);
   barrier_between_passes(commands);
   timestamp(1);
   dispatch_relight(commands);
@@ -177,7 +185,8 @@ void GpuAsset::record_frame(VkCommandBuffer commands, VkQueryPool queries, uint3
   timestamp(3);
   for (const Page& p : pages_) {
     const gpu::ReceivePush push{p.layout.octets};
-    pipelines_->dispatch(commands, Pass::kReceive, p.receive, push, groups_of(p.layout.octets), limits_.max_groups);
+    pipelines_->dispatch(commands, Pass::kReceive, p.receive, push, groups_of(p.layout.octets),
+                         limits_.max_groups);
   }
   barrier_between_passes(commands);
   timestamp(4);

@@ -13,8 +13,8 @@
 namespace lightloom {
 
 struct GpuLimits {
-  uint64_t page_bytes = 0;    ///< largest buffer of asset data
-  uint32_t max_groups = 0;    ///< per dispatch dimension
+  uint64_t page_bytes = 0;  ///< largest buffer of asset data
+  uint32_t max_groups = 0;  ///< per dispatch dimension
   bool force_staging = false;
 };
 
@@ -25,8 +25,9 @@ inline constexpr size_t kSurfaceArrays = 4;
 class GpuAsset {
  public:
   /// Reads and uploads everything. The device, transfer and pipelines must outlive it.
-  static absl::StatusOr<std::unique_ptr<GpuAsset>> load(Device* device, Transfer* transfer, const Pipelines* pipelines,
-                                                        const AssetSource& source, const GpuLimits& limits);
+  static absl::StatusOr<std::unique_ptr<GpuAsset>> load(Device* device, Transfer* transfer,
+                                                        const Pipelines* pipelines, const AssetSource& source,
+                                                        const GpuLimits& limits);
 
   struct Counts {
     uint32_t surface_elements = 0, receivers = 0, probes = 0, cells = 0, clusters = 0, pages = 0, order = 0;
@@ -37,8 +38,8 @@ class GpuAsset {
   const Buffer& array(SurfaceArray a) const { return arrays_[static_cast<size_t>(a)]; }
   void set_environment(Vec3 radiance) { environment_ = radiance; }
 
-  /// One frame: E from E. Writes a time stamp before each pass and after the last (kPasses + 1) if `queries` is not null.
-  /// Ends with a barrier to the next frame, not to all.
+  /// One frame: E from E. Writes a time stamp before each pass and after the last (kPasses + 1) if `queries`
+  /// is not null. Ends with a barrier to the next frame, not to all.
   void record_frame(VkCommandBuffer commands, VkQueryPool queries, uint32_t first_query) const;
 
  private:
@@ -54,7 +55,10 @@ class GpuAsset {
   };
 
   GpuAsset(Device* device, Transfer* transfer, const Pipelines* pipelines, const GpuLimits& limits)
-      : device_(device), transfer_(transfer), pipelines_(pipelines), limits_(limits),
+      : device_(device),
+        transfer_(transfer),
+        pipelines_(pipelines),
+        limits_(limits),
         arena_(device, limits.force_staging ? MemoryUse::kDeviceUnmapped : MemoryUse::kDevice) {}
   absl::Status create_surface(const AssetSource& source);
   absl::Status load_relight(const AssetSource& source);

@@ -64,7 +64,8 @@ absl::Status Pipelines::create_entry(Pass pass) {
   for (uint32_t b = 0; b < pass_info.bindings; ++b) {
     bindings.push_back({b, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr});
   }
-  auto set = vulkan_struct<VkDescriptorSetLayoutCreateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO);
+  auto set =
+      vulkan_struct<VkDescriptorSetLayoutCreateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO);
   set.bindingCount = pass_info.bindings;
   set.pBindings = bindings.data();
   LL_VK_RETURN_IF_ERROR("vkCreateDescriptorSetLayout",

@@ -24,8 +24,8 @@ class Pipelines {
 
   VkDescriptorSetLayout set_layout(Pass pass) const { return entries_[static_cast<size_t>(pass)].set_layout; }
 
-  /// Binds the pass and dispatches `groups` workgroups, at most `max_groups` along a dimension. `push` is the pass's
-  /// push constants of shaders/layout.h.
+  /// Binds the pass and dispatches `groups` workgroups, at most `max_groups` along a dimension. `push` is the
+  /// pass's push constants of shaders/layout.h.
   template <class Push>
   void dispatch(VkCommandBuffer commands, Pass pass, VkDescriptorSet set, const Push& push, uint64_t groups,
                 uint32_t max_groups) const {
@@ -40,8 +40,8 @@ class Pipelines {
   };
   explicit Pipelines(Device* device) : device_(device) {}
   absl::Status create_entry(Pass pass);
-  void dispatch(VkCommandBuffer commands, Pass pass, VkDescriptorSet set, const void* push, uint32_t push_bytes,
-                uint64_t groups, uint32_t max_groups) const;
+  void dispatch(VkCommandBuffer commands, Pass pass, VkDescriptorSet set, const void* push,
+                uint32_t push_bytes, uint64_t groups, uint32_t max_groups) const;
 
   Device* device_;
   std::array<Entry, kPasses> entries_;

@@ -14,8 +14,8 @@ using testing::SyntheticAsset;
 
 constexpr double kPiD = 3.14159265358979323846;
 
-/// One 3 × 1 object whose front texels 0 and 2 and back texel 1 (key 4) are surface: elements 0, 1, 2 are keys 0, 2, 4.
-/// Two probes with two rays each, along z = +1/2 and z = -1/2:
+/// One 3 × 1 object whose front texels 0 and 2 and back texel 1 (key 4) are surface: elements 0, 1, 2 are
+/// keys 0, 2, 4. Two probes with two rays each, along z = +1/2 and z = -1/2:
 ///   probe 0: element 0, element 2;   probe 1: the sky, nothing.
 /// One cell whose probe list is {1, 0}, with the receivers key 4 and key 0. One cluster of one column.
 struct Tiny {
@@ -89,8 +89,8 @@ TEST(Decoder, RadiosityIsReflectedDirectAndIndirectPlusEmission) {
 
 TEST(Decoder, OneCellByHand) {
   Tiny tiny(0);
-  tiny.projection(0, 0) = float_to_half(0.5f);   // manifest probe 0
-  tiny.projection(1, 0) = float_to_half(-0.25f); // manifest probe 1
+  tiny.projection(0, 0) = float_to_half(0.5f);    // manifest probe 0
+  tiny.projection(1, 0) = float_to_half(-0.25f);  // manifest probe 1
   SurfaceLight light = dark(3);
   light.emission[0] = {1, 0, 0};
   light.emission[2] = {3, 2, 0};
@@ -168,7 +168,8 @@ TEST(Decoder, ThreadsDoNotChangeTheResult) {
   Parallel one, three;
   one.threads = 1;
   three.threads = 3;
-  EXPECT_EQ(decode_frame(*loaded, light, none, one).irradiance, decode_frame(*loaded, light, none, three).irradiance);
+  EXPECT_EQ(decode_frame(*loaded, light, none, one).irradiance,
+            decode_frame(*loaded, light, none, three).irradiance);
 }
 
 }  // namespace

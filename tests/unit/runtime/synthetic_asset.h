@@ -14,7 +14,8 @@ struct SyntheticAsset {
   std::map<Digest, std::vector<uint8_t>> chunks;
 
   ChunkRef put(std::vector<uint8_t> bytes);
-  /// Appends the object, its identity made from its index; keys are its surface's, ascending. Returns how chunks name it.
+  /// Appends the object, its identity made from its index; keys are its surface's, ascending. Returns how
+  /// chunks name it.
   ChunkObject add_object(uint32_t width, uint32_t height, const std::vector<uint32_t>& keys);
   void add_probe(const RelightChunk& chunk);
   /// Appends the cell; `probes` are indices into manifest.probes.
@@ -32,16 +33,17 @@ struct RandomAssetOptions {
   int order = 4;
   int relight_rays = 200;
   uint32_t objects = 5;
-  uint32_t side = 16;          ///< of lightmaps, at most
+  uint32_t side = 16;  ///< of lightmaps, at most
   uint32_t probes = 24;
   uint32_t cells = 7;
-  uint32_t max_clusters = 4;   ///< per cell
+  uint32_t max_clusters = 4;  ///< per cell
   uint32_t max_cluster_probes = 9;
   uint32_t max_rank = 32;
   uint64_t seed = 1;
-  bool closed = false;         ///< every ray hits a surface element, every element is a receiver, uniform is 1
+  bool closed = false;  ///< every ray hits a surface element, every element is a receiver, uniform is 1
 };
-/// Consistent with itself (u · projection = correction) and dim enough that feedback converges; otherwise noise.
+/// Consistent with itself (u · projection = correction) and dim enough that feedback converges; otherwise
+/// noise.
 SyntheticAsset random_asset(const RandomAssetOptions& options);
 
 /// Random within physical ranges.
