@@ -32,15 +32,16 @@ struct TexelRef {
 /// Receivers and compressed transport of one bake cell (SL17 Eq. 11).
 ///
 /// For receiver r of a cluster with probe radiance λ (per colour):
-///   c_0 = Σ_i √(4π)·λ_i0 ÷ (4π·P)                       mean radiance of the cluster's P probes
+///   c_0 = Σ_i √(4π)·λ_i0 ÷ (4π·P)                       mean radiance of the cluster's P probes; 0 if P = 0
 ///   c_k = Σ_ij projection[k][i][j]·λ_ij − correction[k]·c_0    k = 1..K
 ///   E_r = π·uniform[r]/65535·c_0 + Σ_k reconstruction[k][r]·c_k
-/// so that the uniform field 1 gives π·uniform[r]/65535, whatever was truncated or rounded.
+/// so that the uniform field 1, as relight rays project it (sh_uniform), gives π·uniform[r]/65535, whatever was truncated
+/// or rounded.
 struct CellChunk {
   struct Cluster {
     uint32_t first_receiver = 0, receivers = 0;
     std::vector<uint32_t> probes;      ///< P indices into the cell's probe list
-    std::vector<float> correction;     ///< K: projection[k]·u, u the coefficients of the uniform field 1
+    std::vector<float> correction;     ///< K: projection[k]·u, u = sh_uniform of every probe
     std::vector<Half> projection;      ///< K × P × sh_stride, rows Σ_c·V_cᵀ, padding 0; singular values descend
     std::vector<Half> reconstruction;  ///< K × receivers rounded up to 8, columns of U_c, padding 0
     Aabb bounds;

@@ -99,6 +99,7 @@ CellResult bake_cell(const RayTracer& tracer, const CellTask& task) {
   options.order = task.params.order;
   options.max_rank = task.params.max_rank;
   options.threshold = task.params.threshold;
+  options.relight_rays = static_cast<uint32_t>(task.params.relight_rays);
   options.seed = task.seed;
   CompressedCell compressed = compress_cell(transport, positions, options);
   out.error = compressed.error;

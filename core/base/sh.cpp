@@ -109,4 +109,18 @@ Vec3 sphere_direction(uint32_t i, uint32_t n) {
   return {static_cast<float>(r * c), static_cast<float>(r * s), static_cast<float>(z)};
 }
 
+std::vector<float> sh_uniform(int order, uint32_t n) {
+  const size_t J = static_cast<size_t>(sh_count(order));
+  std::vector<double> sum(J, 0.0);
+  std::array<float, kMaxShCount> basis;
+  for (uint32_t r = 0; r < n; ++r) {
+    sh_evaluate(order, sphere_direction(r, n), basis);
+    for (size_t j = 1; j < J; ++j) sum[j] += static_cast<double>(basis[j]);
+  }
+  std::vector<float> u(J);
+  u[0] = kShUniform;
+  for (size_t j = 1; j < J; ++j) u[j] = n > 0 ? static_cast<float>(sum[j] * (4 * 3.14159265358979323846 / n)) : 0.0f;
+  return u;
+}
+
 }  // namespace lightloom

@@ -37,4 +37,8 @@ void sincos_2pi(float u, float* sine, float* cosine);
 /// Direction i of n equal-area directions on the sphere (spherical Fibonacci lattice; Keinert et al. 2015).
 Vec3 sphere_direction(uint32_t i, uint32_t n);
 
+/// What the uniform radiance field 1 becomes when a probe projects it with n relight rays: u_j = 4π/n·Σ_r Y_j(ω_r),
+/// √(4π) for j = 0 and the lattice's quadrature error elsewhere. n = 0: without that error.
+std::vector<float> sh_uniform(int order, uint32_t n);
+
 }  // namespace lightloom

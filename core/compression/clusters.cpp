@@ -60,8 +60,9 @@ struct Truncated {
 
 /// Splits off the uniform field, then truncates what is left.
 ///
-/// u: coefficients of the uniform field 1, √(4π) in every DC entry. T = e·uᵀ/|u|² + T′ with e = T·u, so T′·u = 0:
-/// whatever the SVD of T′ loses, the uniform field loses nothing.
+/// u: coefficients of the uniform field 1 at every probe; d: the row that reads the mean radiance, √(4π)/(4πP) in every DC
+/// entry, so d·u = 1. T = e·d + T′ with e = T·u, hence T′·u = 0: whatever the SVD of T′ loses, the uniform field loses
+/// nothing.
 Truncated truncate(const Matrix& transport, std::span<const uint32_t> rows, const CompressionOptions& o, uint64_t seed) {
   const Eigen::Index J = sh_count(o.order);
   Truncated out;
@@ -69,7 +70,9 @@ Truncated truncate(const Matrix& transport, std::span<const uint32_t> rows, cons
   Matrix rest = out.block.t;
   const Eigen::Index probes = static_cast<Eigen::Index>(out.block.probes.size());
   out.uniform = Eigen::VectorXf::Zero(rest.rows());
-  for (Eigen::Index p = 0; p < probes; ++p) out.uniform += rest.col(p * J) * kShUniform;
+  const std::vector<float> u = sh_uniform(o.order, o.relight_rays);
+  const Eigen::Map<const Eigen::VectorXf> u_map(u.data(), J);
+  for (Eigen::Index p = 0; p < probes; ++p) out.uniform += rest.middleCols(p * J, J) * u_map;
   for (Eigen::Index p = 0; p < probes; ++p) {
     rest.col(p * J) -= out.uniform * (kShUniform / (4 * kPi * static_cast<float>(probes)));
   }
@@ -93,7 +96,9 @@ uint16_t to_unorm16(float irradiance) {
 
 /// Rounds the truncated factors to what is stored.
 CellChunk::Cluster quantise(const Truncated& t, std::span<const uint32_t> rows, std::span<const Vec3> positions,
-                            int order) {
+                            const CompressionOptions& o) {
+  const int order = o.order;
+  const std::vector<float> u = sh_uniform(order, o.relight_rays);
   const size_t J = static_cast<size_t>(sh_count(order)), stride = static_cast<size_t>(sh_stride(order));
   const size_t probes = t.block.probes.size(), rank = static_cast<size_t>(t.rank);
   const size_t padded = (rows.size() + 7) / 8 * 8;
@@ -103,16 +108,16 @@ CellChunk::Cluster quantise(const Truncated& t, std::span<const uint32_t> rows, 
   c.projection.assign(rank * probes * stride, 0);
   c.reconstruction.assign(rank * padded, 0);
   for (size_t k = 0; k < rank; ++k) {
-    double dc = 0;
+    double correction = 0;
     for (size_t p = 0; p < probes; ++p) {
       for (size_t j = 0; j < J; ++j) {
         const Eigen::Index column = static_cast<Eigen::Index>(p * J + j);
         const Half h = float_to_half(t.svd.sv(static_cast<Eigen::Index>(k), column) / t.weights(column));
         c.projection[(k * probes + p) * stride + j] = h;
-        if (j == 0) dc += static_cast<double>(half_to_float(h)) * kShUniform;
+        correction += static_cast<double>(half_to_float(h)) * static_cast<double>(u[j]);
       }
     }
-    c.correction.push_back(static_cast<float>(dc));
+    c.correction.push_back(static_cast<float>(correction));
     for (size_t r = 0; r < rows.size(); ++r) {
       c.reconstruction[k * padded + r] = float_to_half(t.svd.u(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(k)));
     }
@@ -153,7 +158,7 @@ CompressedCell compress_cell(const Matrix& transport, std::span<const Vec3> posi
       stack.emplace_back(rows.begin(), middle);
       continue;
     }
-    CellChunk::Cluster cluster = quantise(t, rows, positions, options.order);
+    CellChunk::Cluster cluster = quantise(t, rows, positions, options);
     cluster.first_receiver = static_cast<uint32_t>(out.order.size());
     out.clusters.push_back(std::move(cluster));
     out.order.insert(out.order.end(), rows.begin(), rows.end());
