@@ -63,14 +63,14 @@ struct Truncated {
 /// u: coefficients of the uniform field 1 at every probe; d: the row that reads the mean radiance, √(4π)/(4πP) in every DC
 /// entry, so d·u = 1. T = e·d + T′ with e = T·u, hence T′·u = 0: whatever the SVD of T′ loses, the uniform field loses
 /// nothing.
-Truncated truncate(const Matrix& transport, std::span<const uint32_t> rows, const CompressionOptions& o, uint64_t seed) {
+Truncated truncate(const Matrix& transport, std::span<const uint32_t> rows, const CompressionOptions& o,
+                   std::span<const float> u, uint64_t seed) {
   const Eigen::Index J = sh_count(o.order);
   Truncated out;
   out.block = extract(transport, rows, J);
   Matrix rest = out.block.t;
   const Eigen::Index probes = static_cast<Eigen::Index>(out.block.probes.size());
   out.uniform = Eigen::VectorXf::Zero(rest.rows());
-  const std::vector<float> u = sh_uniform(o.order, o.relight_rays);
   const Eigen::Map<const Eigen::VectorXf> u_map(u.data(), J);
   for (Eigen::Index p = 0; p < probes; ++p) out.uniform += rest.middleCols(p * J, J) * u_map;
   for (Eigen::Index p = 0; p < probes; ++p) {
@@ -96,9 +96,7 @@ uint16_t to_unorm16(float irradiance) {
 
 /// Rounds the truncated factors to what is stored.
 CellChunk::Cluster quantise(const Truncated& t, std::span<const uint32_t> rows, std::span<const Vec3> positions,
-                            const CompressionOptions& o) {
-  const int order = o.order;
-  const std::vector<float> u = sh_uniform(order, o.relight_rays);
+                            int order, std::span<const float> u) {
   const size_t J = static_cast<size_t>(sh_count(order)), stride = static_cast<size_t>(sh_stride(order));
   const size_t probes = t.block.probes.size(), rank = static_cast<size_t>(t.rank);
   const size_t padded = (rows.size() + 7) / 8 * 8;
@@ -132,6 +130,7 @@ CellChunk::Cluster quantise(const Truncated& t, std::span<const uint32_t> rows, 
 CompressedCell compress_cell(const Matrix& transport, std::span<const Vec3> positions,
                              const CompressionOptions& options) {
   LL_CHECK(static_cast<size_t>(transport.rows()) == positions.size());
+  const std::vector<float> u = sh_uniform(options.order, options.relight_rays);
   CompressedCell out;
   double error2 = 0, norm2 = 0;
 
@@ -142,7 +141,7 @@ CompressedCell compress_cell(const Matrix& transport, std::span<const Vec3> posi
   while (!stack.empty()) {
     std::vector<uint32_t> rows = std::move(stack.back());
     stack.pop_back();
-    const Truncated t = truncate(transport, rows, options, hash_combine(options.seed, rows.size()));
+    const Truncated t = truncate(transport, rows, options, u, hash_combine(options.seed, rows.size()));
     const double allowed = static_cast<double>(options.threshold) * options.threshold * t.norm2;
     if (t.error2 > allowed && rows.size() >= 2 * options.min_receivers) {
       // Median split along the longest axis, ties by index.
@@ -158,7 +157,7 @@ CompressedCell compress_cell(const Matrix& transport, std::span<const Vec3> posi
       stack.emplace_back(rows.begin(), middle);
       continue;
     }
-    CellChunk::Cluster cluster = quantise(t, rows, positions, options);
+    CellChunk::Cluster cluster = quantise(t, rows, positions, options.order, u);
     cluster.first_receiver = static_cast<uint32_t>(out.order.size());
     out.clusters.push_back(std::move(cluster));
     out.order.insert(out.order.end(), rows.begin(), rows.end());

@@ -117,8 +117,10 @@ std::vector<Probe> repair(const RayTracer& tracer, const Cell& cell, float spaci
 
   std::vector<Vec3> points;
   for (const Unseen& u : unseen) {
-    for (const float t : {0.3f, 0.7f}) {
-      const Vec3 p = u.from + (u.sky ? u.to * spacing : u.to - u.from) * t;
+    const Vec3 way = u.sky ? u.to * spacing : u.to - u.from;
+    const float distance = length(way);
+    for (const float step : {0.1f, 0.3f}) {  // of a cell, but not past the middle
+      const Vec3 p = u.from + way * std::min(0.5f, step * spacing / distance);
       if (cell_of(p, spacing) == cell) points.push_back(p);
     }
   }

@@ -16,17 +16,19 @@ namespace {
 struct Sample {
   enum Kind : uint8_t { kSurface, kSky, kDead } kind = kDead;
   Vec3 position;   // of the hit, pushed off, for kSurface
+  Vec3 normal;
   Vec3 direction;  // of the ray
 };
 
 Sample shoot(const RayTracer& tracer, const ShadingPoint& from, Vec3 direction) {
   const Hit hit = tracer.closest(from.position, direction);
-  if (!hit) return {Sample::kSky, {}, direction};
+  if (!hit) return {Sample::kSky, {}, {}, direction};
   const Scene& scene = tracer.scene();
   const Object& object = scene.objects[hit.object];
   // Single-sided back hits block and emit nothing.
   if (hit.back && !scene.materials[object.triangles[hit.triangle].material].double_sided) return {};
-  return {Sample::kSurface, shading_point(object, hit.triangle, hit.b1, hit.b2, hit.back).position, direction};
+  const ShadingPoint y = shading_point(object, hit.triangle, hit.b1, hit.b2, hit.back);
+  return {Sample::kSurface, y.position, y.geometric, direction};
 }
 
 /// V_i(ω) and ψ_i(ω): whether probe i sees what the sample found, and in which direction.
@@ -37,6 +39,16 @@ bool sees(const RayTracer& tracer, Vec3 probe, const Sample& s, Vec3* psi) {
   }
   *psi = normalize(s.position - probe);
   return tracer.visible(s.position, probe);
+}
+
+/// How finely probe i resolves the surface around the hit: the solid angle of a unit of its area, cosθ/d². A probe's
+/// radiance is blurred by a fixed angle, so the nearest one that looks at the hit squarely blurs it least. SL17 weighs by
+/// the receiver's distance alone; this factor took the error of the Cornell box from 0.091 to 0.075 (ADR 0002).
+float resolution(Vec3 probe, Vec3 psi, const Sample& s) {
+  if (s.kind == Sample::kSky) return 1;
+  constexpr float kGrazing = 0.05f;  // keeps weights of probes in the hit's plane finite in the quotient
+  const Vec3 d = probe - s.position;
+  return std::max(kGrazing, -dot(psi, s.normal)) / dot(d, d);
 }
 
 }  // namespace
@@ -74,7 +86,7 @@ GatherStats gather_row(const RayTracer& tracer, const GatherPoint& receiver, std
     ++stats.gather_rays;
     if (sample.kind == Sample::kDead) continue;
 
-    // K_ij = w_i·V_i·Y_j(ψ_i) ÷ Σ_k w_k·V_k (Eq. 4).
+    // K_ij = w_i·V_i·Y_j(ψ_i) ÷ Σ_k w_k·V_k (Eq. 4), the weights w_i(x) times resolution.
     std::array<Vec3, 64> psi;
     std::array<float, 64> wv;
     float sum = 0;
@@ -82,7 +94,8 @@ GatherStats gather_row(const RayTracer& tracer, const GatherPoint& receiver, std
       wv[n] = 0;
       if (!(w[n] > 0)) continue;
       ++stats.visibility_rays;
-      if (sees(tracer, probes[receiver.near[n]], sample, &psi[n])) wv[n] = w[n];
+      const Vec3 probe = probes[receiver.near[n]];
+      if (sees(tracer, probe, sample, &psi[n])) wv[n] = w[n] * resolution(probe, psi[n], sample);
       sum += wv[n];
     }
     if (sum > 0) {

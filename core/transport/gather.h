@@ -2,8 +2,8 @@
 // nearby probes that see it.
 //
 // Silvennoinen & Lehtinen, "Real-time Global Illumination by Precomputed Local Reconstruction from Sparse Radiance
-// Probes", TOG 36(6), 2017, Eqs. 2, 4, 7. Different from the paper: links are the k nearest probes with the distance to
-// the next one as support radius (ADR 0002).
+// Probes", TOG 36(6), 2017, Eqs. 2, 4, 7. Different from the paper (ADR 0002): links are the k nearest probes with the
+// distance to the next one as support radius, and weights also follow how finely a probe resolves what was hit.
 #pragma once
 
 #include <cstdint>
