@@ -110,7 +110,7 @@ absl::StatusOr<Plan> make_plan(const RayTracer& tracer, const BakeParams& reques
   PlacementOptions placement;
   placement.spacing = plan.params.spacing;
   placement.nearest = plan.params.links + kFallbacks;
-  LL_ASSIGN_OR_RETURN(plan.placement, place_probes(tracer, plan.receivers, placement, control.stage("probes")));
+  LL_ASSIGN_OR_RETURN(plan.placement, place_probes(tracer, &plan.receivers, placement, control.stage("probes")));
 
   std::vector<uint32_t> all(plan.receivers.all.size());
   for (uint32_t i = 0; i < all.size(); ++i) all[i] = i;

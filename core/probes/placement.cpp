@@ -164,30 +164,57 @@ std::vector<Probe> repair(const RayTracer& tracer, const Cell& cell, float spaci
   return out;
 }
 
-}  // namespace
-
-absl::StatusOr<PlacementResult> place_probes(const RayTracer& tracer, const Receivers& receivers,
-                                             const PlacementOptions& options, const Parallel& parallel) {
-  const float spacing = options.spacing;
-
-  // Cells with receivers, and cells between two such neighbours: the middle of a room, not the open air around it.
-  std::map<Cell, std::vector<uint32_t>> home;
-  for (uint32_t r = 0; r < receivers.all.size(); ++r) {
-    home[cell_of(receivers.all[r].point.position, spacing)].push_back(r);
+/// Cells with front-side receivers, and cells between two such neighbours: the middle of a room, not the open air around
+/// it.
+std::vector<Cell> base_cells(const Receivers& receivers, float spacing) {
+  std::set<Cell> home;
+  for (const Receiver& r : receivers.all) {
+    if (!r.back) home.insert(cell_of(r.point.position, spacing));
   }
-  std::set<Cell> near;
-  for (const auto& [c, unused] : home) {
-    near.insert(c);
+  std::set<Cell> cells = home;
+  for (const Cell& c : home) {
     for (size_t axis = 0; axis < 3; ++axis) {
       Cell between = c, beyond = c;
       between[axis] += 1;
       beyond[axis] += 2;
-      if (home.contains(beyond)) near.insert(between);
+      if (home.contains(beyond)) cells.insert(between);
     }
   }
+  return {cells.begin(), cells.end()};
+}
+
+/// A cell's receivers that repair looks at, and what it found.
+struct Home {
+  Cell cell{};
+  std::vector<uint32_t> tested;
+  std::vector<Probe> repairs;
+  uint64_t rays = 0, unseen = 0;
+};
+
+std::vector<Home> repair_homes(const Receivers& receivers, float spacing) {
+  std::map<Cell, std::vector<uint32_t>> by_cell;
+  for (uint32_t r = 0; r < receivers.all.size(); ++r) {
+    by_cell[cell_of(receivers.all[r].point.position, spacing)].push_back(r);
+  }
+  std::vector<Home> homes;
+  for (auto& [cell, list] : by_cell) {
+    std::sort(list.begin(), list.end(), [&](uint32_t a, uint32_t b) {
+      return std::pair(mix64(receivers.all[a].seed), a) < std::pair(mix64(receivers.all[b].seed), b);
+    });
+    if (list.size() > kTestReceivers) list.resize(kTestReceivers);
+    homes.push_back({cell, std::move(list), {}, 0, 0});
+  }
+  return homes;
+}
+
+}  // namespace
+
+absl::StatusOr<PlacementResult> place_probes(const RayTracer& tracer, Receivers* receivers,
+                                             const PlacementOptions& options, const Parallel& parallel) {
+  const float spacing = options.spacing;
 
   // Base probes.
-  const std::vector<Cell> cells(near.begin(), near.end());
+  const std::vector<Cell> cells = base_cells(*receivers, spacing);
   std::vector<std::optional<Vec3>> points(cells.size());
   if (!parallel_for(cells.size(), parallel, [&](uint64_t i) { points[i] = base_point(tracer, cells[i], spacing); })) {
     return absl::CancelledError("cancelled while placing probes");
@@ -196,26 +223,26 @@ absl::StatusOr<PlacementResult> place_probes(const RayTracer& tracer, const Rece
   for (size_t i = 0; i < cells.size(); ++i) {
     if (points[i]) result.probes.push_back({*points[i], cells[i], 0});
   }
+  const ProbeGrid grid(result.probes, spacing);
+
+  // Back sides that are seen.
+  std::vector<uint8_t> seen(receivers->all.size(), 1);
+  bool done = parallel_for(receivers->all.size(), parallel, [&](uint64_t i) {
+    const Receiver& r = receivers->all[i];
+    if (!r.back) return;
+    const auto near = grid.nearest(r.point.position, options.nearest);
+    seen[i] = std::any_of(near.begin(), near.end(), [&](const ProbeGrid::Near& n) {
+      return tracer.visible(r.point.position, result.probes[n.probe].position);
+    });
+  });
+  if (!done) return absl::CancelledError("cancelled while placing probes");
+  receivers->retain(std::vector<bool>(seen.begin(), seen.end()));
 
   // Repairs, each decided from base probes alone.
-  struct Home {
-    Cell cell;
-    std::vector<uint32_t> tested;
-    std::vector<Probe> repairs;
-    uint64_t rays = 0, unseen = 0;
-  };
-  std::vector<Home> homes;
-  for (auto& [c, list] : home) {
-    std::sort(list.begin(), list.end(), [&](uint32_t a, uint32_t b) {
-      return std::pair(mix64(receivers.all[a].seed), a) < std::pair(mix64(receivers.all[b].seed), b);
-    });
-    if (list.size() > kTestReceivers) list.resize(kTestReceivers);
-    homes.push_back({c, std::move(list), {}, 0, 0});
-  }
-  const ProbeGrid grid(result.probes, spacing);
-  const bool done = parallel_for(homes.size(), parallel, [&](uint64_t i) {
+  std::vector<Home> homes = repair_homes(*receivers, spacing);
+  done = parallel_for(homes.size(), parallel, [&](uint64_t i) {
     Home& h = homes[i];
-    auto unseen = unseen_hits(tracer, receivers, h.tested, result.probes, grid, options.nearest, &h.rays);
+    auto unseen = unseen_hits(tracer, *receivers, h.tested, result.probes, grid, options.nearest, &h.rays);
     h.unseen = unseen.size();
     if (static_cast<double>(h.unseen) > kRepairShare * static_cast<double>(h.rays)) {
       h.repairs = repair(tracer, h.cell, spacing, std::move(unseen), h.rays);

@@ -32,7 +32,9 @@ struct PlacementResult {
   double unseen = 0;          ///< share of test rays whose hit, or sky, no base probe in reach sees: what repair starts from
   size_t repairs = 0;         ///< probes added by repair
 };
-absl::StatusOr<PlacementResult> place_probes(const RayTracer& tracer, const Receivers& receivers,
+/// Base probes are placed for the front sides; back sides that none of them in reach sees are then dropped from
+/// `receivers`: they lie in cavities that no light of the level's open space enters and no camera looks into.
+absl::StatusOr<PlacementResult> place_probes(const RayTracer& tracer, Receivers* receivers,
                                              const PlacementOptions& options, const Parallel& parallel);
 
 /// A spacing that gives a level of these bounds about 200 cells, rounded to two significant digits so that small edits do

@@ -32,6 +32,18 @@ Space classify(const RayTracer& tracer, const ShadingPoint& point, uint64_t seed
 
 }  // namespace
 
+void Receivers::retain(const std::vector<bool>& keep) {
+  std::vector<Receiver> kept;
+  for (Range& range : ranges) {
+    const uint32_t begin = static_cast<uint32_t>(kept.size());
+    for (uint32_t i = range.begin; i < range.end; ++i) {
+      if (keep[i]) kept.push_back(all[i]);
+    }
+    range = {begin, static_cast<uint32_t>(kept.size())};
+  }
+  all = std::move(kept);
+}
+
 uint32_t Receivers::find(uint32_t object, uint32_t key) const {
   const auto begin = all.begin() + ranges[object].begin, end = all.begin() + ranges[object].end;
   const auto it = std::lower_bound(begin, end, key, [](const Receiver& r, uint32_t k) { return r.key < k; });

@@ -33,6 +33,8 @@ struct Receivers {
   std::vector<Range> ranges;        ///< per object, its part of `all`
   uint64_t solid_texels = 0;        ///< front sides dropped as inside solids
 
+  /// Drops the receivers that `keep` (one entry per receiver) says false of.
+  void retain(const std::vector<bool>& keep);
   /// Index into `all`, or kNone.
   uint32_t find(uint32_t object, uint32_t key) const;
   /// The receiver whose texel a hit falls in, or the nearest one of the same object and side within 8 texels (texels
