@@ -1,0 +1,17 @@
+// Cycles' own noise here is 0.02 (1 bounce) and 0.04 (32) of the bounds.
+#include "tests/statistical/against_cycles.h"
+
+namespace lightloom {
+namespace {
+
+class SponzaAgainstCycles : public testing::TestWithParam<test::CyclesCase> {};
+
+TEST_P(SponzaAgainstCycles, Agrees) { test::check_against_cycles(GetParam()); }
+
+INSTANTIATE_TEST_SUITE_P(Bakes, SponzaAgainstCycles,
+                         testing::Values(test::CyclesCase{"sponza", 1, 256, 1024, 0.05},
+                                         test::CyclesCase{"sponza", 32, 256, 512, 0.08}),
+                         test::case_name);
+
+}  // namespace
+}  // namespace lightloom
