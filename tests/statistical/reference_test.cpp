@@ -180,7 +180,7 @@ TEST(Noise, TellsTheTrueError) {
   Scene scene = test::closed_box({3, 3, 3});
   test::add_point_light(&scene, {1.5f, 1.5f, 1.5f}, 10);
   const Traced coarse = trace(scene, 3, 2, 128), finer = trace(scene, 3, 2, 2048, 0, 2),
-               truth = trace(scene, 3, 2, 16384, 0, 3);
+               truth = trace(scene, 3, 2, 8192, 0, 3);
   const auto error = [&](const Traced& t) {
     double difference = 0, total = 0;
     for (int y = 0; y < truth.result.image.height; ++y) {
