@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 
 namespace lightloom {
@@ -237,9 +238,10 @@ SurfacePoint sample_texel(const Object& object, const LightmapUv& uv, const Texe
   const Vec3 normal = geometric_normal(object, texel.triangle), centre = position(object, own);
   // Other charts may share the texel: what continues the surface lies within its diagonal and faces alike.
   const float reach = 1.5f * texel_size(object, uv.corners[texel.triangle], texel.triangle);
-  // Rejection over the texel's square. Successive points follow the R2 sequence (Roberts 2018) from the jitter, so the
-  // first, and mostly only, point keeps the caller's stratification.
+  // Rejection over the texel's square. The first, and mostly only, point keeps the caller's stratification; the others
+  // are random numbers that the jitter names: steps of fixed length would favour some of the surface.
   double x = jitter.u, y = jitter.v;
+  Rng rng(static_cast<uint64_t>(std::bit_cast<uint32_t>(jitter.u)) << 32 | std::bit_cast<uint32_t>(jitter.v));
   for (int attempt = 0; attempt < 16; ++attempt) {
     const Point p{texel.x + x, texel.y + y};
     for (uint32_t f = 0; f < texel.fragments; ++f) {
@@ -252,10 +254,8 @@ SurfacePoint sample_texel(const Object& object, const LightmapUv& uv, const Texe
       }
       return s;
     }
-    x += 0.7548776662466927;
-    y += 0.5698402909980532;
-    x -= std::floor(x);
-    y -= std::floor(y);
+    x = rng.next_float();
+    y = rng.next_float();
   }
   return own;
 }
