@@ -1,0 +1,139 @@
+// Baked light against what it must be: closed forms, path tracing, and the same asset on Vulkan.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/sampling.h"
+#include "core/receivers/open_space.h"
+#include "core/reference/compare.h"
+#include "core/reference/path_tracer.h"
+#include "core/relight/lightmap.h"
+#include "core/scene/builtin.h"
+#include "tests/support/baked_level.h"
+#include "tests/support/test_scenes.h"
+
+namespace lightloom {
+namespace {
+
+using test::bake_level;
+using test::Device;
+using test::light;
+using test::value_or_die;
+
+/// Area-weighted mean over receivers, channels together.
+double mean(const test::BakedLevel& level, const std::vector<Vec3>& e, auto&& keep) {
+  double sum = 0, weight = 0;
+  for (size_t i = 0; i < e.size(); ++i) {
+    const Receiver& r = level.elements.receivers.all[i];
+    if (!keep(r)) continue;
+    const double area = level.elements.receivers.grids[r.object].texels[r.texel].area;
+    sum += area * (e[i].x + e[i].y + e[i].z) / 3;
+    weight += area;
+  }
+  return sum / weight;
+}
+
+class Furnace : public ::testing::TestWithParam<float> {};
+
+// Every wall emits radiance L and reflects a: L_out = L + a·L_out, so E = π·L ÷ (1 − a).
+TEST_P(Furnace, EveryReceiverReachesTheClosedForm) {
+  const float a = GetParam();
+  BakeParams params;
+  params.spacing = 1;
+  params.texels_per_metre = 4;
+  const auto level = bake_level(test::furnace(a, 1), params);
+  const int bounces = static_cast<int>(std::ceil(std::log(1e-4) / std::log(a)));
+  const std::vector<Vec3> e = light(*level, bounces);
+  const float expected = kPi / (1 - a);
+  for (size_t i = 0; i < e.size(); ++i) ASSERT_NEAR(e[i].x, expected, 0.01f * expected) << "receiver " << i;
+}
+INSTANTIATE_TEST_SUITE_P(Albedo, Furnace, ::testing::Values(0.5f, 0.9f, 0.99f));
+
+TEST(OpenPlane, WhiteSkyGivesPi) {
+  BakeParams params;
+  params.spacing = 1;
+  params.texels_per_metre = 4;
+  const auto level = bake_level(test::open_plane(4, {1, 1, 1}), params);
+  for (const Vec3 e : light(*level, 1)) ASSERT_NEAR(e.x, kPi, 0.001f * kPi);
+}
+
+TEST(SealedRoom, NoLightLeaks) {
+  for (const float wall : {0.05f, 0.01f}) {
+    BakeParams params;
+    params.spacing = 1;
+    params.texels_per_metre = 6;
+    const auto level = bake_level(test::sealed_double_room(wall), params);
+    const std::vector<Vec3> e = light(*level, 8);
+    const auto inside = [](const Receiver& r, float x0, float x1) {
+      const Vec3 p = r.point.position;
+      return p.x > x0 && p.x < x1 && p.y > -0.001f && p.y < 3.001f && p.z > -0.001f && p.z < 3.001f;
+    };
+    const double lit = mean(*level, e, [&](const Receiver& r) { return inside(r, 0, 3 - wall / 2 + 1e-3f); });
+    const double dark = mean(*level, e, [&](const Receiver& r) { return inside(r, 3 + wall / 2 - 1e-3f, 6.1f); });
+    EXPECT_GT(lit, 0);
+    EXPECT_LE(dark / lit, 1e-3) << "wall of " << wall << " m";
+  }
+}
+
+/// Eight seeded point lights in the box's free space: at least half a metre from any surface.
+std::vector<Light> random_lights(const RayTracer& tracer) {
+  std::vector<Light> lights;
+  Rng rng(2017);
+  const Aabb box = tracer.scene().bounds();
+  while (lights.size() < 8) {
+    const Vec3 u{rng.next_float(), rng.next_float(), rng.next_float()};
+    const Vec3 p = box.lo + u * box.size();
+    FirstHits f;
+    for (uint32_t i = 0; i < 256; ++i) f.add(tracer.closest(p, sphere_direction(i, 256)));
+    if (f.solid() || f.nearest < 0.5f) continue;
+    Light light;
+    light.position = p;
+    light.intensity = 20;
+    lights.push_back(light);
+  }
+  return lights;
+}
+
+TEST(Cornell, EightRandomLights) {
+  BakeParams params;
+  params.spacing = 2.36f;
+  params.texels_per_metre = 6;
+  auto level = bake_level(value_or_die(builtin_scene("cornell")), params);
+  ASSERT_EQ(level->manifest.probes.size(), 26u);
+  double log_sum = 0;
+  for (const Light& one : random_lights(*level->tracer)) {
+    level->scene->lights = {one};
+    const Image baked = lightmap_image(level->elements, light(*level, 1));
+    ReferenceOptions options;
+    options.samples = 512;
+    const ReferenceResult truth = value_or_die(reference_lightmap(*level->tracer, level->elements.layout, options));
+    const Comparison c = value_or_die(compare(baked, truth.image, {}));
+    std::printf("light at %.2f %.2f %.2f: rel_rmse %.4f (reference noise %.4f)\n", static_cast<double>(one.position.x),
+                static_cast<double>(one.position.y), static_cast<double>(one.position.z), c.rel_rmse, truth.noise);
+    log_sum += std::log(c.rel_rmse);
+  }
+  const double geometric_mean = std::exp(log_sum / 8);
+  std::printf("%zu probes, order 7: geometric mean rel_rmse %.4f\n", level->manifest.probes.size(), geometric_mean);
+  EXPECT_LE(geometric_mean, 0.105);
+}
+
+TEST(Vulkan, SameLightAsTheDecoder) {
+  BakeParams params;
+  params.texels_per_metre = 6;
+  const auto level = bake_level(value_or_die(builtin_scene("flat")), params);
+  const std::vector<Vec3> cpu = light(*level, 4), gpu = light(*level, 4, Device::kVulkan);
+  const double scale = mean(*level, cpu, [](const Receiver&) { return true; });
+  std::vector<double> error;
+  for (size_t i = 0; i < cpu.size(); ++i) {
+    const Vec3 d = cpu[i] - gpu[i];
+    error.push_back(std::max({std::abs(d.x), std::abs(d.y), std::abs(d.z)}) / scale);
+  }
+  const auto p999 = error.begin() + static_cast<std::ptrdiff_t>(static_cast<double>(error.size()) * 0.999);
+  std::nth_element(error.begin(), p999, error.end());
+  std::printf("99.9th percentile of |E_vulkan - E_cpu| / mean E: %.2e\n", *p999);
+  EXPECT_LE(*p999, 0.005);
+}
+
+}  // namespace
+}  // namespace lightloom
