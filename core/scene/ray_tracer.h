@@ -36,7 +36,7 @@ class RayTracer {
 
   /// Nearest hit with t in (0, t_max]. `direction` need not be unit; t is in its units. Alpha-masked holes let through.
   Hit closest(Vec3 origin, Vec3 direction, float t_max = std::numeric_limits<float>::infinity()) const;
-  /// Whether anything lies at t in (0, t_max).
+  /// Whether anything lies at t in (0, t_max].
   bool occluded(Vec3 origin, Vec3 direction, float t_max) const;
   /// Whether the open segment between two points in free space is free. Push points on surfaces off by offset() first.
   bool visible(Vec3 from, Vec3 to) const;

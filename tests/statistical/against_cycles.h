@@ -24,8 +24,8 @@ struct CyclesCase {
   double bound;  ///< on rel_rmse over blocks of 4 × 4 texels
 };
 
-/// Cycles 3.4 interpolates 8-bit textures before it decodes sRGB; glTF asks for the reverse, which is brighter. Textures
-/// drawn out by Cycles' rule leave next to nothing to interpolate by ours.
+/// Cycles 3.4 interpolates 8-bit textures before it decodes sRGB; glTF asks for the reverse, which is
+/// brighter. Textures drawn out by Cycles' rule leave next to nothing to interpolate by ours.
 inline void draw_out_textures(Scene* scene) {
   constexpr int kFactor = 4;
   for (Texture& texture : scene->textures) {
@@ -54,7 +54,8 @@ inline std::string case_name(const testing::TestParamInfo<CyclesCase>& info) {
   return std::string(info.param.scene) + "_" + std::to_string(info.param.bounces) + "bounce";
 }
 
-/// Traces the case and checks it: rel_rmse within the bound, the ratio of sums within three standard errors of 1.
+/// Traces the case and checks it: rel_rmse within the bound, the ratio of sums within three standard errors
+/// of 1.
 inline void check_against_cycles(const CyclesCase& c) {
   const std::filesystem::path folder = scenes_folder() / c.scene;
   const auto file = folder / "references" / ("indirect_" + std::to_string(c.bounces) + "bounce.exr");
@@ -86,9 +87,11 @@ inline void check_against_cycles(const CyclesCase& c) {
   const auto comparison = compare(reference->image, *truth, compare_options);
   ASSERT_TRUE(comparison.ok()) << comparison.status();
 
-  std::printf("%s, %d bounces, %d samples: rel_rmse %.5f (own noise per texel %.5f), ratio %.5f, ratio_error %.5f, %llu texels\n",
-              c.scene, c.bounces, c.samples, comparison->rel_rmse, reference->noise, comparison->ratio,
-              comparison->ratio_error, static_cast<unsigned long long>(comparison->texels));
+  std::printf(
+      "%s, %d bounces, %d samples: rel_rmse %.5f (own noise per texel %.5f), ratio %.5f, ratio_error %.5f, "
+      "%llu texels\n",
+      c.scene, c.bounces, c.samples, comparison->rel_rmse, reference->noise, comparison->ratio,
+      comparison->ratio_error, static_cast<unsigned long long>(comparison->texels));
   EXPECT_LE(comparison->rel_rmse, c.bound);
   EXPECT_GT(comparison->ratio_error, 0);
   EXPECT_LE(std::abs(comparison->ratio - 1), 3 * comparison->ratio_error)

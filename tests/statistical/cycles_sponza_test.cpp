@@ -1,5 +1,6 @@
-// Of the bounds, 0.022 (1 bounce) and 0.044 (32) are the noise of the bakes. A known difference remains in the ratio,
-// +0.3 %: where an interpolated normal leans, Cycles loses the directions that enter the surface; leave() mirrors them.
+// Of the bounds, 0.022 (1 bounce) and 0.044 (32) are the noise of the bakes. A known difference remains in
+// the ratio, +0.3 %: where an interpolated normal leans, Cycles loses the directions that enter the surface;
+// leave() mirrors them.
 #include "tests/statistical/against_cycles.h"
 
 namespace lightloom {

@@ -25,7 +25,8 @@ class SealedRoom : public testing::Test {
   void SetUp() override {
     const std::filesystem::path folder = test::scenes_folder() / "rooms";
     if (!std::filesystem::exists(folder / "scene.glb") || !std::filesystem::exists(folder / "lights.json")) {
-      GTEST_SKIP() << "no rooms/scene.glb and rooms/lights.json: set LIGHTLOOM_SCENES to the folder of the test scenes";
+      GTEST_SKIP() << "no rooms/scene.glb and rooms/lights.json: set LIGHTLOOM_SCENES to the folder of the "
+                      "test scenes";
     }
     auto scene = load_gltf(folder / "scene.glb");
     ASSERT_TRUE(scene.ok()) << scene.status();
@@ -70,8 +71,8 @@ class SealedRoom : public testing::Test {
       light.mean += (e.x + e.y + e.z) / 3;
     }
     light.mean /= std::max(1, light.texels);
-    std::printf("sealed room: %d texels, %d lit, largest %g, mean %g W/m²\n", light.texels, light.lit, light.largest,
-                light.mean);
+    std::printf("sealed room: %d texels, %d lit, largest %g, mean %g W/m²\n", light.texels, light.lit,
+                light.largest, light.mean);
     return light;
   }
 

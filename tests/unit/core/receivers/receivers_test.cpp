@@ -2,8 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <memory>
 #include <set>
+#include <string>
+#include <utility>
 
 #include "tests/support/test_scenes.h"
 
@@ -40,7 +44,8 @@ struct World {
   int count(const std::string& name, bool back) const {
     const uint32_t o = object(name);
     int n = 0;
-    for (uint32_t i = receivers.ranges[o].begin; i < receivers.ranges[o].end; ++i) n += receivers.all[i].back == back;
+    for (uint32_t i = receivers.ranges[o].begin; i < receivers.ranges[o].end; ++i)
+      n += receivers.all[i].back == back;
     return n;
   }
   size_t texels(const std::string& name) const { return receivers.grids[object(name)].texels.size(); }
@@ -121,7 +126,8 @@ TEST(FindReceivers, FloorUnderACrateIsSolid) {
 
 TEST(FindReceivers, DividerSharesItsRoomsAndHidesTheirEdges) {
   const World w(test::sealed_double_room(0.5f), 8);
-  EXPECT_EQ(w.receivers.solid_texels, 4u * 4 * 24) << "floor, ceiling and two walls, four texels wide inside the divider";
+  EXPECT_EQ(w.receivers.solid_texels, 4u * 4 * 24)
+      << "floor, ceiling and two walls, four texels wide inside the divider";
 }
 
 Scene room_with_curtain(bool double_sided) {
@@ -219,7 +225,8 @@ TEST(Locate, NearestElse) {
         const int x = static_cast<int>(p.x), y = static_cast<int>(p.y);
         const auto distance = [&](uint32_t receiver) {
           const uint32_t key = w.receivers.all[receiver].key;
-          const float dx = static_cast<float>(key % 40) + 0.5f - p.x, dy = static_cast<float>(key / 40) + 0.5f - p.y;
+          const float dx = static_cast<float>(key % 40) + 0.5f - p.x,
+                      dy = static_cast<float>(key / 40) + 0.5f - p.y;
           return dx * dx + dy * dy;
         };
         // All within eight texels.
@@ -248,23 +255,19 @@ TEST(Locate, NearestElse) {
 
 TEST(Locate, NothingFartherThanEightTexels) {
   const World w(test::room_with_crate(), 20);  // the crate covers floor texels 20 to 49 in x and z
-  Hit hit = w.tracer->closest({1.75f, 0.5f, 1.75f}, {0, -1, 0});
-  hit.object = w.object("floor");
-  hit.triangle = 0;
-  hit.back = false;
   const auto locate_at = [&](float x, float z) {
-    Hit at = hit;
-    const Hit above = w.tracer->closest({x, -1, z}, {0, 1, 0}, 1.5f);  // the floor from below, or the crate's bottom
-    EXPECT_TRUE(above);
-    // The floor's u runs along z and v along x, triangles (0, 1, 2) and (0, 2, 3).
+    // The floor's u runs along z and v along x; its triangles are (0, 1, 2) and (0, 2, 3).
     const float u = z / 4, v = x / 4;
-    at.triangle = v <= u ? 0 : 1;
-    at.b1 = v <= u ? u - v : u;
-    at.b2 = v <= u ? v : v - u;
-    return w.receivers.locate(w.layout, at);
+    Hit hit;
+    hit.object = w.object("floor");
+    hit.triangle = v <= u ? 0 : 1;
+    hit.b1 = v <= u ? u - v : u;
+    hit.b2 = v <= u ? v : v - u;
+    return w.receivers.locate(w.layout, hit);
   };
   EXPECT_EQ(locate_at(1.77f, 1.77f), Receivers::kNone);
-  EXPECT_NE(locate_at(1.12f, 1.77f), Receivers::kNone);
+  EXPECT_EQ(locate_at(1.48f, 1.77f), Receivers::kNone) << "texel 29: ten from the edge";
+  EXPECT_NE(locate_at(1.37f, 1.77f), Receivers::kNone) << "texel 27: eight from texel 19";
   EXPECT_NE(locate_at(0.52f, 1.77f), Receivers::kNone);
 }
 

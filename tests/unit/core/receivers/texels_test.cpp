@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <utility>
+#include <vector>
 
 #include "core/base/rng.h"
 #include "core/scene/shapes.h"
@@ -33,7 +35,8 @@ Mapped quad(int width, int height, float x0, float y0, float x1, float y1) {
 double triangle_area(const Object& object, uint32_t t) {
   const auto& v = object.triangles[t].v;
   return static_cast<double>(length(cross(object.positions[v[1]] - object.positions[v[0]],
-                                          object.positions[v[2]] - object.positions[v[0]]))) / 2;
+                                          object.positions[v[2]] - object.positions[v[0]]))) /
+         2;
 }
 
 double world_area(const Object& object) {
@@ -42,8 +45,8 @@ double world_area(const Object& object) {
   return sum;
 }
 
-/// A height field over all of a width × height lightmap, its inner vertices moved at random: no uv triangle is like
-/// another, they cover every texel once, and area per texel differs from triangle to triangle.
+/// A height field over all of a width × height lightmap, its inner vertices moved at random: no uv triangle
+/// is like another, they cover every texel once, and area per texel differs from triangle to triangle.
 Mapped random_patchwork(int width, int height, int cells, Rng* rng) {
   Mapped m;
   m.uv.width = width;
@@ -148,7 +151,8 @@ TEST(Rasterise, AreasAddUp) {
     }
     EXPECT_NEAR(texels, expected, 1e-4 * expected);
     EXPECT_NEAR(fragments, expected, 1e-4 * expected);
-    for (const auto& [t, area] : by_triangle) EXPECT_NEAR(area, triangle_area(m.object, t), 1e-4 * (area + 0.01)) << t;
+    for (const auto& [t, area] : by_triangle)
+      EXPECT_NEAR(area, triangle_area(m.object, t), 1e-4 * (area + 0.01)) << t;
     EXPECT_EQ(by_triangle.size(), m.object.triangles.size());
   }
 }
@@ -174,7 +178,8 @@ TEST(Rasterise, KnowsWhichCentresAreCovered) {
         const auto it = found.find({x, y});
         EXPECT_EQ(it != found.end() && it->second->centre_covered, covered) << x << ' ' << y;
         if (it == found.end() || !covered) continue;
-        EXPECT_TRUE(inside(m.uv.corners[it->second->triangle], x + 0.5, y + 0.5)) << "the centre's own triangle";
+        EXPECT_TRUE(inside(m.uv.corners[it->second->triangle], x + 0.5, y + 0.5))
+            << "the centre's own triangle";
       }
     }
   }

@@ -42,7 +42,7 @@ TEST(Compare, GreyByHand) {
   EXPECT_NEAR(c.rel_rmse, std::sqrt(17.0 / 40), 1e-7);
   EXPECT_NEAR(c.psnr, 20 * std::log10(4 / std::sqrt(17.0 / 4)), 1e-6);
   EXPECT_NEAR(c.bias, 3.0 / 12, 1e-7);
-  EXPECT_NEAR(c.p50, 0, 1e-7);        // |d| ÷ 3, sorted: 0, 0, 1/3, 4/3
+  EXPECT_NEAR(c.p50, 0, 1e-7);  // |d| ÷ 3, sorted: 0, 0, 1/3, 4/3
   EXPECT_NEAR(c.p95, 4.0 / 3, 1e-6);
   EXPECT_NEAR(c.p99, 4.0 / 3, 1e-6);
   EXPECT_NEAR(c.ratio, 15.0 / 12, 1e-7);

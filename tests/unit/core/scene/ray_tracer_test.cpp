@@ -4,8 +4,12 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <filesystem>
-#include <numeric>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "core/base/rng.h"
 #include "core/base/sampling.h"
@@ -76,6 +80,8 @@ TEST(RayTracer, Misses) {
 TEST(RayTracer, LimitsTheDistance) {
   const Scene scene = single_triangle();
   const auto tracer = trace(scene);
+  EXPECT_TRUE(tracer->closest({1, 1, 5}, {0, 0, -1}, 5)) << "the end counts";
+  EXPECT_TRUE(tracer->occluded({1, 1, 5}, {0, 0, -1}, 5));
   EXPECT_FALSE(tracer->closest({1, 1, 5}, {0, 0, -1}, 4.999f));
   EXPECT_TRUE(tracer->closest({1, 1, 5}, {0, 0, -1}, 5.001f));
   EXPECT_FALSE(tracer->occluded({1, 1, 5}, {0, 0, -1}, 4.999f));
@@ -150,7 +156,8 @@ TEST(RayTracer, DynamicObjectsAreNotThere) {
 
 TEST(RayTracer, MirroredObjectsKeepTheirFront) {
   Scene scene;
-  test::add_solid_box(&scene, "box", {-3, 0, 0}, {-1, 1, 1}, test::add_material(&scene, "grey", {0.5f, 0.5f, 0.5f}));
+  test::add_solid_box(&scene, "box", {-3, 0, 0}, {-1, 1, 1},
+                      test::add_material(&scene, "grey", {0.5f, 0.5f, 0.5f}));
   scene.objects[0].transform[0] = -1;  // its mesh lies at x in [1, 3] and is turned over
   test::identify(&scene);
   const auto file = std::filesystem::path(testing::TempDir()) / "ray_tracer_test_mirrored.glb";
@@ -178,22 +185,19 @@ Scene shuffled(const Scene& scene, Rng* rng) {
 }
 
 TEST(RayTracer, ContentSettlesTies) {
-  // More coincident triangles than any BVH leaf holds, told apart by sidedness only.
+  // More coincident triangles than a BVH leaf holds, two in each object.
   Scene scene;
   for (uint32_t i = 0; i < 11; ++i) {
     Object& object = add_flat_triangle(&scene, 0, test::add_material(&scene, "grey", {0.5f, 0.5f, 0.5f}));
     add_triangle(&object, {0, 0, 0}, {4, 0, 0}, {0, 4, 0}, i);
-    object.positions[3].x += 0;  // the second triangle coincides too
-    object.name = std::to_string(i);
-  }
-  for (uint32_t i = 0; i < 11; ++i) {
-    // Away from the ray, so that meshes differ.
-    add_triangle(&scene.objects[i], {10, 0, static_cast<float>(i)}, {11, 0, 0}, {10, 1, 0}, i);
+    // Away from the rays, so that meshes differ.
+    add_triangle(&object, {10, 0, static_cast<float>(i)}, {11, 0, 0}, {10, 1, 0}, i);
   }
   test::identify(&scene);
-  const Digest first = std::min_element(scene.objects.begin(), scene.objects.end(), [](const Object& a, const Object& b) {
-                         return a.id < b.id;
-                       })->id;
+  const Digest first =
+      std::min_element(scene.objects.begin(), scene.objects.end(), [](const Object& a, const Object& b) {
+        return a.id < b.id;
+      })->id;
   Rng rng(1);
   for (int i = 0; i < 20; ++i) {
     const Scene other = shuffled(scene, &rng);
@@ -241,8 +245,9 @@ std::vector<Answer> answers(const Scene& scene) {
     const Vec3 origin = Vec3{rng.next_float() - 0.5f, rng.next_float() - 0.5f, rng.next_float() - 0.5f} * 20;
     const Vec3 direction = square_to_sphere(rng.next_float(), rng.next_float());
     const Hit hit = tracer->closest(origin, direction, 50);
-    out.push_back({hit ? scene.objects[hit.object].id : Digest{}, hit.triangle, std::bit_cast<uint32_t>(hit.t),
-                   std::bit_cast<uint32_t>(hit.b1), std::bit_cast<uint32_t>(hit.b2), static_cast<bool>(hit), hit.back,
+    out.push_back({hit ? scene.objects[hit.object].id : Digest{}, hit.triangle,
+                   std::bit_cast<uint32_t>(hit.t), std::bit_cast<uint32_t>(hit.b1),
+                   std::bit_cast<uint32_t>(hit.b2), static_cast<bool>(hit), hit.back,
                    tracer->occluded(origin, direction, 5)});
   }
   return out;
