@@ -188,10 +188,10 @@ absl::StatusOr<CellChunk> decode_cell(std::span<const uint8_t> bytes) {
       return corrupt("cell", "a cluster reaches past the chunk's arrays");
     }
     if (k.rank > 0 && k.probes == 0) return corrupt("cell", "a cluster has columns but no probes");
-    const Aabb bounds{k.lo, k.hi};
-    if (!is_finite(k.lo) || !is_finite(k.hi) || bounds.empty() || !std::isfinite(k.error)) {
+    if (!is_finite(k.lo) || !is_finite(k.hi) || !std::isfinite(k.error)) {
       return corrupt("cell", "a cluster's bounds or error are not finite");
     }
+    if (k.lo.x > k.hi.x || k.lo.y > k.hi.y || k.lo.z > k.hi.z) return corrupt("cell", "a cluster's bounds are empty");
     const auto slice = [](const auto& v, uint64_t from, uint64_t n) {
       return std::decay_t<decltype(v)>(v.begin() + static_cast<int64_t>(from),
                                        v.begin() + static_cast<int64_t>(from + n));
@@ -203,7 +203,7 @@ absl::StatusOr<CellChunk> decode_cell(std::span<const uint8_t> bytes) {
     out.correction = slice(correction, column, k.rank);
     out.projection = slice(projection, p_at, p_size);
     out.reconstruction = slice(reconstruction, r_at, r_size);
-    out.bounds = bounds;
+    out.bounds = {k.lo, k.hi};
     out.error = k.error;
     c.clusters.push_back(std::move(out));
     receiver += k.receivers;
