@@ -1,9 +1,11 @@
 #include "core/asset/asset.h"
 
+#include <algorithm>
 #include <map>
 #include <string>
 
 #include "core/base/file.h"
+#include "core/base/text.h"
 
 namespace lightloom {
 namespace {
@@ -51,9 +53,12 @@ std::filesystem::path ChunkStore::path(const Digest& digest) const {
 
 absl::StatusOr<ChunkRef> ChunkStore::put(std::span<const uint8_t> bytes) const {
   const ChunkRef ref{sha256(bytes), bytes.size()};
+  // What is there may be damaged: "bake again" must mend it.
   std::error_code error;
   const auto size = std::filesystem::file_size(path(ref.digest), error);
-  if (!error && size == bytes.size()) return ref;
+  if (!error && size == bytes.size()) {
+    if (const auto there = read_file(path(ref.digest)); there.ok() && std::ranges::equal(*there, bytes)) return ref;
+  }
   LL_RETURN_IF_ERROR(write_file_atomic(path(ref.digest), bytes));
   return ref;
 }
@@ -90,7 +95,7 @@ absl::Status verify_asset(const std::filesystem::path& loom) {
 
   for (const ObjectEntry& o : m.objects) {
     if (o.surface.size == 0) continue;
-    const std::string what = "surface of object '" + o.name + "'";
+    const std::string what = "surface of object '" + printable(o.name) + "'";
     LL_ASSIGN_OR_RETURN(const auto bytes, store.get(o.surface));
     const auto chunk = decode_surface(bytes);
     if (!chunk.ok()) return in_context(chunk.status(), what);

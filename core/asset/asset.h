@@ -15,7 +15,7 @@ class ChunkStore {
  public:
   explicit ChunkStore(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
-  /// Atomic; a chunk that is already there is left alone.
+  /// Atomic; a chunk that is already there is left alone, or replaced if its bytes are damaged.
   absl::StatusOr<ChunkRef> put(std::span<const uint8_t> bytes) const;
   /// Fails if the chunk is missing, or its size or digest differ.
   absl::StatusOr<std::vector<uint8_t>> get(const ChunkRef& ref) const;

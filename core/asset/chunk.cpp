@@ -180,18 +180,19 @@ absl::StatusOr<CellChunk> decode_cell(std::span<const uint8_t> bytes) {
   uint64_t receiver = 0, probe = 0, column = 0, p_at = 0, r_at = 0;
   for (const ClusterRecord& k : records) {
     if (k.first_receiver != receiver || k.receivers == 0) return corrupt("cell", "its clusters do not follow on");
-    const uint64_t p_size = static_cast<uint64_t>(k.rank) * k.probes * stride;
+    const uint64_t p_rows = static_cast<uint64_t>(k.rank) * k.probes;
     const uint64_t r_size = k.rank * rounded_up_to_8(k.receivers);
     if (receiver + k.receivers > c.receivers.size() || probe + k.probes > probes.size() ||
-        column + k.rank > correction.size() || p_size > projection.size() - p_at ||
+        column + k.rank > correction.size() || p_rows > (projection.size() - p_at) / stride ||
         r_size > reconstruction.size() - r_at) {
       return corrupt("cell", "a cluster reaches past the chunk's arrays");
     }
     if (k.rank > 0 && k.probes == 0) return corrupt("cell", "a cluster has columns but no probes");
-    const Aabb bounds{k.lo, k.hi};
-    if (!is_finite(k.lo) || !is_finite(k.hi) || bounds.empty() || !std::isfinite(k.error)) {
+    if (!is_finite(k.lo) || !is_finite(k.hi) || !std::isfinite(k.error)) {
       return corrupt("cell", "a cluster's bounds or error are not finite");
     }
+    if (k.lo.x > k.hi.x || k.lo.y > k.hi.y || k.lo.z > k.hi.z) return corrupt("cell", "a cluster's bounds are empty");
+    const uint64_t p_size = p_rows * stride;
     const auto slice = [](const auto& v, uint64_t from, uint64_t n) {
       return std::decay_t<decltype(v)>(v.begin() + static_cast<int64_t>(from),
                                        v.begin() + static_cast<int64_t>(from + n));
@@ -203,7 +204,7 @@ absl::StatusOr<CellChunk> decode_cell(std::span<const uint8_t> bytes) {
     out.correction = slice(correction, column, k.rank);
     out.projection = slice(projection, p_at, p_size);
     out.reconstruction = slice(reconstruction, r_at, r_size);
-    out.bounds = bounds;
+    out.bounds = {k.lo, k.hi};
     out.error = k.error;
     c.clusters.push_back(std::move(out));
     receiver += k.receivers;

@@ -7,6 +7,7 @@
 
 #include "core/base/bytes.h"
 #include "core/base/sh.h"
+#include "core/base/text.h"
 
 namespace lightloom {
 namespace {
@@ -77,6 +78,8 @@ bool valid(const BakeParams& p) {
          p.lightmap_size >= 0;
 }
 
+bool is_finite(const Aabb& box) { return is_finite(box.lo) && is_finite(box.hi); }
+
 bool in_range(uint32_t first, uint32_t count, size_t size) {
   return first <= size && count <= size - first;
 }
@@ -86,9 +89,10 @@ absl::Status validate(const Manifest& m) {
   if (m.width < 0 || m.height < 0 || m.width > 1 << 16 || m.height > 1 << 16) {
     return corrupt("the lightmap image's size is out of range");
   }
+  if (!is_finite(m.bounds) && !(m.bounds.lo == Aabb{}.lo && m.bounds.hi == Aabb{}.hi)) return corrupt("its bounds are not finite");
   for (const ObjectEntry& o : m.objects) {
     if (o.width < 0 || o.height < 0 || o.x < 0 || o.y < 0 || o.width > m.width - o.x || o.height > m.height - o.y) {
-      return corrupt("object '" + o.name + "' lies outside the lightmap image");
+      return corrupt("object '" + printable(o.name) + "' lies outside the lightmap image");
     }
   }
   for (const ProbeEntry& p : m.probes) {
@@ -100,12 +104,15 @@ absl::Status validate(const Manifest& m) {
         !in_range(c.first_probe, c.probes, m.cell_probes.size())) {
       return corrupt("a cell's clusters or probes are out of range");
     }
-    if (!is_finite(c.bounds.lo) || !is_finite(c.bounds.hi) || !std::isfinite(c.error) || !std::isfinite(c.unseen)) {
+    if (!is_finite(c.bounds) || !std::isfinite(c.error) || !std::isfinite(c.unseen)) {
       return corrupt("a cell's bounds or quality are not finite");
     }
     cluster += c.clusters;
   }
   if (cluster != m.clusters.size()) return corrupt("clusters without a cell");
+  for (const ClusterEntry& c : m.clusters) {
+    if (!is_finite(c.bounds) || !std::isfinite(c.error)) return corrupt("a cluster's bounds or error are not finite");
+  }
   for (const uint32_t p : m.cell_probes) {
     if (p >= m.probes.size()) return corrupt("a cell names a probe that is not there");
   }

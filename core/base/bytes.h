@@ -1,6 +1,7 @@
 // Little-endian byte streams for stored structures. The reader trusts nothing.
 #pragma once
 
+#include <algorithm>
 #include <bit>
 #include <cstdint>
 #include <cstring>

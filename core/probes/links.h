@@ -25,6 +25,7 @@ class ProbeGrid {
     }
   };
   /// The `count` probes nearest to p (fewer if there are not as many within kReach cells), nearest first, ties by index.
+  /// REQUIRES: count > 0; p within 2^30 cells of the origin.
   std::vector<Near> nearest(Vec3 p, int count) const;
 
   /// Probes farther than this many cells are not looked for: what lies beyond cannot change a receiver's links.

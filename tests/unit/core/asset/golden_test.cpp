@@ -1,0 +1,64 @@
+// The stored bytes of version 1, pinned. A change here is a change of the format: it needs a new version
+// number in the encoder (chunk.cpp, manifest.cpp), a reader that still knows the old one, and a line in
+// docs/asset-format.md.
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "core/base/hash.h"
+#include "tests/unit/core/asset/samples.h"
+
+namespace lightloom {
+namespace {
+
+using ::lightloom::testing::sample_cell;
+using ::lightloom::testing::sample_manifest;
+using ::lightloom::testing::sample_relight;
+using ::lightloom::testing::sample_surface;
+
+/// The first 64 bytes, in groups of four.
+std::string excerpt(const std::vector<uint8_t>& bytes) {
+  static constexpr char kDigits[] = "0123456789abcdef";
+  std::string out;
+  for (size_t i = 0; i < 64; ++i) {
+    if (i > 0 && i % 4 == 0) out += ' ';
+    out += kDigits[bytes.at(i) >> 4];
+    out += kDigits[bytes[i] & 15];
+  }
+  return out;
+}
+
+TEST(Golden, Cell) {
+  const auto bytes = encode_cell(sample_cell());
+  EXPECT_EQ(excerpt(bytes),
+            "4c4c4343 01000000 01000000 03000000 02000000 05000000 02000000 03000000 28000000 00000000 "
+            "18000000 00000000 03000000 00000000 00000000 00000000");
+  EXPECT_EQ(sha256(bytes).hex(), "0d8bc6847d49a19fd392d57f9c57aad36b42e0b23505c482b0529e7d0319dd3d");
+}
+
+TEST(Golden, Relight) {
+  const auto bytes = encode_relight(sample_relight());
+  EXPECT_EQ(excerpt(bytes),
+            "4c4c4352 01000000 02000000 08000000 0000c03f 000000c0 0000803e 00000000 11111111 11111111 "
+            "11111111 11111111 11111111 11111111 11111111 11111111");
+  EXPECT_EQ(sha256(bytes).hex(), "cf70897f51df3fb2459b209b88f176feedb84884faa8cc137a3f062304ecf664");
+}
+
+TEST(Golden, Surface) {
+  const auto bytes = encode_surface(sample_surface());
+  EXPECT_EQ(excerpt(bytes),
+            "4c4c4353 01000000 04000000 00000000 11111111 11111111 11111111 11111111 11111111 11111111 "
+            "11111111 11111111 04000000 02000000 00000000 00000000");
+  EXPECT_EQ(sha256(bytes).hex(), "c94d27dde0d62268ecea891ef94a074356d535e46d404dcf69bfddba8ec660a3");
+}
+
+TEST(Golden, Manifest) {
+  const auto bytes = encode_manifest(sample_manifest());
+  EXPECT_EQ(excerpt(bytes),
+            "4c4f4f4d 01000000 02000000 02000000 01000000 02000000 03000000 11000000 33333333 33333333 "
+            "33333333 33333333 33333333 33333333 33333333 33333333");
+  EXPECT_EQ(sha256(bytes).hex(), "a6bb6b9b790de9d3b91738c453e21bc76a1809a10746a9fd0a974ace691de525");
+}
+
+}  // namespace
+}  // namespace lightloom
