@@ -24,10 +24,9 @@ int main(int argc, char** argv) {
 
   spdlog::set_default_logger(spdlog::stderr_color_mt("lightloom-server"));
   lightloom::StopSignal stop;
-  const auto server =
-      lightloom::Server::start(listen, {.version = std::string(lightloom::kVersion),
-                                        .protocol_version = lightloom::kProtocolVersion,
-                                        .method_version = std::string(lightloom::kMethodVersion)});
+  const auto server = lightloom::Server::start(listen, {.version = std::string(lightloom::kVersion),
+                                                        .protocol_version = lightloom::kProtocolVersion,
+                                                        .method_version = std::string(lightloom::kMethodVersion)});
   if (!server.ok()) {
     spdlog::error("{}", std::string(server.status().message()));
     return 1;

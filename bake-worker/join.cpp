@@ -15,8 +15,8 @@ Introduction introduce_this_machine(uint32_t threads) {
           .protocol_version = kProtocolVersion,
           .method_version = std::string(kMethodVersion),
           // What -march=x86-64-v3 lets the compiler use beyond SSE4.2; Embree needs avx2, fma and f16c of it.
-          .avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
-                  __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2"),
+          .avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi") &&
+                  __builtin_cpu_supports("bmi2"),
           .threads = threads};
 }
 
@@ -45,21 +45,18 @@ absl::StatusOr<std::string> join(const std::shared_ptr<grpc::Channel>& channel, 
         absl::StrCat("no answer within ", deadline.count(), " ms: is lightloom-server running there?"));
   }
   if (!status.ok()) {
-    return absl::UnavailableError(
-        absl::StrCat("the server cannot be asked: ", printable(status.error_message()), " (gRPC code ",
-                     static_cast<int>(status.error_code()), ")"));
+    return absl::UnavailableError(absl::StrCat("the server cannot be asked: ", printable(status.error_message()),
+                                               " (gRPC code ", static_cast<int>(status.error_code()), ")"));
   }
   switch (response.outcome_case()) {
     case v1::JoinResponse::kAccepted:
       return printable(response.accepted().server_version(), 64);
     case v1::JoinResponse::kRefused:
-      return absl::FailedPreconditionError(
-          absl::StrCat("refused: ", printable(response.refused().message(), 400)));
+      return absl::FailedPreconditionError(absl::StrCat("refused: ", printable(response.refused().message(), 400)));
     case v1::JoinResponse::OUTCOME_NOT_SET:
       break;
   }
-  return absl::UnavailableError(
-      "the server's answer is empty: it is not a lightloom-server of this protocol");
+  return absl::UnavailableError("the server's answer is empty: it is not a lightloom-server of this protocol");
 }
 
 }  // namespace lightloom

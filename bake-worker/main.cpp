@@ -20,9 +20,7 @@ int main(int argc, char** argv) {
   uint32_t threads = std::max(1u, std::thread::hardware_concurrency());
   uint32_t timeout = 10;
   app.add_option("--server", server, "HOST:PORT of lightloom-server")->required();
-  app.add_option("--threads", threads, "threads to bake with")
-      ->check(CLI::Range(1, 1024))
-      ->capture_default_str();
+  app.add_option("--threads", threads, "threads to bake with")->check(CLI::Range(1, 1024))->capture_default_str();
   app.add_option("--timeout", timeout, "seconds to wait for the server")
       ->check(CLI::Range(1, 3600))
       ->capture_default_str();
@@ -36,7 +34,7 @@ int main(int argc, char** argv) {
     spdlog::error("cannot join {}: {}", server, std::string(joined.status().message()));
     return 1;
   }
-  spdlog::info("joined {} (version {}) with {} threads; this release has no tasks, so that is all", server,
-               *joined, threads);
+  spdlog::info("joined {} (version {}) with {} threads; this release has no tasks, so that is all", server, *joined,
+               threads);
   return 0;
 }

@@ -21,38 +21,42 @@ struct Options {
 };
 
 nlohmann::json to_json(const BakeReport& r) {
-  return {{"receivers", r.receivers},
-          {"probes", r.probes},
-          {"probes_repair", r.repairs},
-          {"cells", r.cells},
-          {"clusters", r.clusters},
-          {"clusters_reused", 0},
-          {"coefficients_per_receiver", r.coefficients},
-          {"rays_gather", r.rays_gather},
-          {"rays_visibility", r.rays_visibility},
-          {"unseen_fraction", r.rays_gather > 0 ? static_cast<double>(r.unseen) / static_cast<double>(r.rays_gather) : 0.0},
-          {"seconds",
-           {{"total", r.seconds_total},
-            {"plan", r.seconds_plan},
-            {"transport", r.seconds_transport},
-            {"compress", r.seconds_compress},
-            {"write", r.seconds_write}}},
-          {"bytes",
-           {{"total", r.bytes_total},
-            {"projection", r.bytes_projection},
-            {"reconstruction", r.bytes_reconstruction},
-            {"relight", r.bytes_relight}}}};
+  return {
+      {"receivers", r.receivers},
+      {"probes", r.probes},
+      {"probes_repair", r.repairs},
+      {"cells", r.cells},
+      {"clusters", r.clusters},
+      {"clusters_reused", 0},
+      {"coefficients_per_receiver", r.coefficients},
+      {"rays_gather", r.rays_gather},
+      {"rays_visibility", r.rays_visibility},
+      {"unseen_fraction", r.rays_gather > 0 ? static_cast<double>(r.unseen) / static_cast<double>(r.rays_gather) : 0.0},
+      {"seconds",
+       {{"total", r.seconds_total},
+        {"plan", r.seconds_plan},
+        {"transport", r.seconds_transport},
+        {"compress", r.seconds_compress},
+        {"write", r.seconds_write}}},
+      {"bytes",
+       {{"total", r.bytes_total},
+        {"projection", r.bytes_projection},
+        {"reconstruction", r.bytes_reconstruction},
+        {"relight", r.bytes_relight}}}};
 }
 
 void print(const std::string& output, const BakeReport& r) {
   std::printf("%s: %s\n", output.c_str(), human_bytes(static_cast<double>(r.bytes_total)).c_str());
-  std::printf("  %llu receivers, %llu probes (%llu of them repairs), %llu clusters in %llu cells, %.1f coefficients a receiver\n",
-              static_cast<unsigned long long>(r.receivers), static_cast<unsigned long long>(r.probes),
-              static_cast<unsigned long long>(r.repairs), static_cast<unsigned long long>(r.clusters),
-              static_cast<unsigned long long>(r.cells), r.coefficients);
+  std::printf(
+      "  %llu receivers, %llu probes (%llu of them repairs), %llu clusters in %llu cells, %.1f coefficients a "
+      "receiver\n",
+      static_cast<unsigned long long>(r.receivers), static_cast<unsigned long long>(r.probes),
+      static_cast<unsigned long long>(r.repairs), static_cast<unsigned long long>(r.clusters),
+      static_cast<unsigned long long>(r.cells), r.coefficients);
   const double rays = static_cast<double>(r.rays_gather + r.rays_visibility);
-  std::printf("  %s: plan %s, transport %s (%srays, %srays/s), compression %s\n", human_seconds(r.seconds_total).c_str(),
-              human_seconds(r.seconds_plan).c_str(), human_seconds(r.seconds_transport).c_str(), human_count(rays).c_str(),
+  std::printf("  %s: plan %s, transport %s (%srays, %srays/s), compression %s\n",
+              human_seconds(r.seconds_total).c_str(), human_seconds(r.seconds_plan).c_str(),
+              human_seconds(r.seconds_transport).c_str(), human_count(rays).c_str(),
               human_count(r.seconds_transport > 0 ? rays / r.seconds_transport : 0).c_str(),
               human_seconds(r.seconds_compress).c_str());
   std::printf("  unseen by any probe: %.4f %% of gather rays\n",

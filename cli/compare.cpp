@@ -25,14 +25,16 @@ absl::Status run(const Options& o) {
   LL_ASSIGN_OR_RETURN(const Comparison c, compare(a, b, options));
   if (!o.difference.empty()) LL_RETURN_IF_ERROR(write_png(difference_image(a, b, options, o.gain), o.difference));
   if (o.json) {
-    const nlohmann::json out = {{"rel_rmse", c.rel_rmse}, {"bias", c.bias},   {"psnr", c.psnr},
-                                {"p50", c.p50},           {"p95", c.p95},     {"p99", c.p99},
-                                {"ratio", c.ratio},       {"ratio_error", c.ratio_error}, {"texels", c.texels}};
+    const nlohmann::json out = {
+        {"rel_rmse", c.rel_rmse}, {"bias", c.bias}, {"psnr", c.psnr},   {"p50", c.p50},
+        {"p95", c.p95},           {"p99", c.p99},   {"ratio", c.ratio}, {"ratio_error", c.ratio_error},
+        {"texels", c.texels}};
     std::printf("%s\n", out.dump().c_str());
   } else {
-    std::printf("rel_rmse %.5f  bias %+.5f  psnr %.2f dB  p50 %.5f  p95 %.5f  p99 %.5f  ratio %.5f ± %.5f  texels %llu\n",
-                c.rel_rmse, c.bias, c.psnr, c.p50, c.p95, c.p99, c.ratio, c.ratio_error,
-                static_cast<unsigned long long>(c.texels));
+    std::printf(
+        "rel_rmse %.5f  bias %+.5f  psnr %.2f dB  p50 %.5f  p95 %.5f  p99 %.5f  ratio %.5f ± %.5f  texels %llu\n",
+        c.rel_rmse, c.bias, c.psnr, c.p50, c.p95, c.p99, c.ratio, c.ratio_error,
+        static_cast<unsigned long long>(c.texels));
   }
   return absl::OkStatus();
 }

@@ -48,9 +48,12 @@ absl::StatusOr<float> write_heatmap(const Options& o, const Manifest& m) {
         const TexelRef texel = chunk.receivers[chunk.clusters[k].first_receiver + r];
         const ChunkObject& object = chunk.objects[texel.slot];
         if (texel.key >= object.width * object.height) continue;  // back side
-        const auto entry = std::find_if(m.objects.begin(), m.objects.end(), [&](const ObjectEntry& e) { return e.id == object.id; });
-        if (entry == m.objects.end()) return absl::DataLossError("a cell names an object that the manifest lacks; run lightloom verify");
-        image.set_rgb(entry->x + static_cast<int>(texel.key % object.width), entry->y + static_cast<int>(texel.key / object.width), colour);
+        const auto entry =
+            std::find_if(m.objects.begin(), m.objects.end(), [&](const ObjectEntry& e) { return e.id == object.id; });
+        if (entry == m.objects.end())
+          return absl::DataLossError("a cell names an object that the manifest lacks; run lightloom verify");
+        image.set_rgb(entry->x + static_cast<int>(texel.key % object.width),
+                      entry->y + static_cast<int>(texel.key / object.width), colour);
       }
     }
   }
@@ -89,35 +92,42 @@ Summary summarise(const Manifest& m) {
 }
 
 nlohmann::json to_json(const Manifest& m, const Summary& s, bool with_cells) {
-  nlohmann::json out = {{"method_version", m.method_version},
-                        {"scene_hash", m.scene_hash.hex()},
-                        {"lightmap", {m.width, m.height}},
-                        {"params",
-                         {{"order", m.params.order},
-                          {"spacing", m.params.spacing},
-                          {"links", m.params.links},
-                          {"rays", m.params.rays},
-                          {"relight_rays", m.params.relight_rays},
-                          {"max_rank", m.params.max_rank},
-                          {"threshold", m.params.threshold},
-                          {"texels_per_metre", m.params.texels_per_metre},
-                          {"lightmap_size", m.params.lightmap_size},
-                          {"seed", m.params.seed}}},
-                        {"objects", m.objects.size()},
-                        {"receivers", s.receivers},
-                        {"probes", m.probes.size()},
-                        {"cells", m.cells.size()},
-                        {"clusters", m.clusters.size()},
-                        {"coefficients_per_receiver", s.coefficients},
-                        {"probes_per_cluster", s.probes_per_cluster},
-                        {"error", std::sqrt(s.error2)},
-                        {"unseen_fraction", s.unseen},
-                        {"bytes", {{"total", s.bytes}, {"cells", s.cell}, {"relight", s.relight}, {"surfaces", s.surface}}}};
+  nlohmann::json out = {
+      {"method_version", m.method_version},
+      {"scene_hash", m.scene_hash.hex()},
+      {"lightmap", {m.width, m.height}},
+      {"params",
+       {{"order", m.params.order},
+        {"spacing", m.params.spacing},
+        {"links", m.params.links},
+        {"rays", m.params.rays},
+        {"relight_rays", m.params.relight_rays},
+        {"max_rank", m.params.max_rank},
+        {"threshold", m.params.threshold},
+        {"texels_per_metre", m.params.texels_per_metre},
+        {"lightmap_size", m.params.lightmap_size},
+        {"seed", m.params.seed}}},
+      {"objects", m.objects.size()},
+      {"receivers", s.receivers},
+      {"probes", m.probes.size()},
+      {"cells", m.cells.size()},
+      {"clusters", m.clusters.size()},
+      {"coefficients_per_receiver", s.coefficients},
+      {"probes_per_cluster", s.probes_per_cluster},
+      {"error", std::sqrt(s.error2)},
+      {"unseen_fraction", s.unseen},
+      {"bytes", {{"total", s.bytes}, {"cells", s.cell}, {"relight", s.relight}, {"surfaces", s.surface}}}};
   if (with_cells) {
     for (const CellEntry& c : m.cells) {
-      out["cell_list"].push_back({{"level", c.level}, {"cell", c.cell}, {"receivers", c.receivers}, {"clusters", c.clusters},
-                                  {"probes", c.probes}, {"error", c.error}, {"unseen", c.unseen},
-                                  {"chunk", c.chunk.digest.hex()}, {"bytes", c.chunk.size}});
+      out["cell_list"].push_back({{"level", c.level},
+                                  {"cell", c.cell},
+                                  {"receivers", c.receivers},
+                                  {"clusters", c.clusters},
+                                  {"probes", c.probes},
+                                  {"error", c.error},
+                                  {"unseen", c.unseen},
+                                  {"chunk", c.chunk.digest.hex()},
+                                  {"bytes", c.chunk.size}});
     }
   }
   return out;
@@ -128,23 +138,25 @@ void print(const Options& o, const Manifest& m, const Summary& s) {
               human_bytes(static_cast<double>(s.bytes)).c_str(), human_bytes(static_cast<double>(s.cell)).c_str(),
               human_bytes(static_cast<double>(s.relight)).c_str(), human_bytes(static_cast<double>(s.surface)).c_str(),
               m.method_version.c_str());
-  std::printf("  level     %zu objects, %.1f × %.1f × %.1f m, lightmap %d×%d\n", m.objects.size(), static_cast<double>(m.bounds.size().x),
-              static_cast<double>(m.bounds.size().y), static_cast<double>(m.bounds.size().z), m.width, m.height);
+  std::printf("  level     %zu objects, %.1f × %.1f × %.1f m, lightmap %d×%d\n", m.objects.size(),
+              static_cast<double>(m.bounds.size().x), static_cast<double>(m.bounds.size().y),
+              static_cast<double>(m.bounds.size().z), m.width, m.height);
   std::printf("  probes    %zu of order %d, spacing %.3g m, %d relight rays each\n", m.probes.size(), m.params.order,
               static_cast<double>(m.params.spacing), m.params.relight_rays);
-  std::printf("  receivers %llu in %zu cells, %zu clusters\n", static_cast<unsigned long long>(s.receivers), m.cells.size(),
-              m.clusters.size());
+  std::printf("  receivers %llu in %zu cells, %zu clusters\n", static_cast<unsigned long long>(s.receivers),
+              m.cells.size(), m.clusters.size());
   std::printf("  rank      %.1f coefficients a receiver (most %u), %.1f probes a cluster\n", s.coefficients, s.max_rank,
               s.probes_per_cluster);
   std::printf("  quality   truncation error %.4f, unseen %.4f %%\n", std::sqrt(s.error2), 100 * s.unseen);
   if (!o.cells) return;
-  std::printf("  %5s %18s %9s %8s %6s %8s %8s %10s  chunk\n", "level", "cell", "receivers", "clusters", "probes", "error", "unseen", "bytes");
+  std::printf("  %5s %18s %9s %8s %6s %8s %8s %10s  chunk\n", "level", "cell", "receivers", "clusters", "probes",
+              "error", "unseen", "bytes");
   for (const CellEntry& c : m.cells) {
     char where[64];
     std::snprintf(where, sizeof where, "%d,%d,%d", c.cell[0], c.cell[1], c.cell[2]);
     std::printf("  %5d %18s %9u %8u %6u %8.4f %8.4f %10llu  %s\n", c.level, where, c.receivers, c.clusters, c.probes,
-                static_cast<double>(c.error), static_cast<double>(c.unseen), static_cast<unsigned long long>(c.chunk.size),
-                c.chunk.digest.hex().substr(0, 12).c_str());
+                static_cast<double>(c.error), static_cast<double>(c.unseen),
+                static_cast<unsigned long long>(c.chunk.size), c.chunk.digest.hex().substr(0, 12).c_str());
   }
 }
 
@@ -158,7 +170,9 @@ absl::Status run(const Options& o) {
   }
   if (!o.heatmap.empty()) {
     LL_ASSIGN_OR_RETURN(const float top, write_heatmap(o, m));
-    if (!o.json) std::printf("  %s: %s per cluster, blue 0 to red %.4g\n", o.heatmap.c_str(), o.quantity.c_str(), static_cast<double>(top));
+    if (!o.json)
+      std::printf("  %s: %s per cluster, blue 0 to red %.4g\n", o.heatmap.c_str(), o.quantity.c_str(),
+                  static_cast<double>(top));
   }
   return absl::OkStatus();
 }

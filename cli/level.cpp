@@ -34,7 +34,8 @@ absl::StatusOr<Camera> find_camera(const Scene& scene, const std::string& name) 
   std::string known;
   for (const Camera& camera : scene.cameras) known += (known.empty() ? "" : ", ") + camera.name;
   return absl::NotFoundError(name.empty() ? "the scene has no camera; add one or leave --camera out"
-                                          : "the scene has no camera '" + name + "'; it has: " + (known.empty() ? "none" : known));
+                                          : "the scene has no camera '" + name +
+                                                "'; it has: " + (known.empty() ? "none" : known));
 }
 
 }  // namespace lightloom

@@ -30,7 +30,7 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", std::string(kVersion) + ", method " + std::string(kMethodVersion));
   app.require_subcommand(1);
 
-  const std::vector<Command> commands = {bake_command(),    inspect_command(),   verify_command(),    render_command(),
+  const std::vector<Command> commands = {bake_command(),      inspect_command(), verify_command(),    render_command(),
                                          reference_command(), compare_command(), make_scene_command()};
   absl::Status status;
   for (const Command& command : commands) {

@@ -37,9 +37,12 @@ std::string human_count(double n) {
 std::string human_seconds(double s) {
   char text[64];
   const int whole = static_cast<int>(s);
-  if (s < 60) std::snprintf(text, sizeof text, "%.1fs", s);
-  else if (s < 3600) std::snprintf(text, sizeof text, "%dm%02ds", whole / 60, whole % 60);
-  else std::snprintf(text, sizeof text, "%dh%02dm", whole / 3600, whole / 60 % 60);
+  if (s < 60)
+    std::snprintf(text, sizeof text, "%.1fs", s);
+  else if (s < 3600)
+    std::snprintf(text, sizeof text, "%dm%02ds", whole / 60, whole % 60);
+  else
+    std::snprintf(text, sizeof text, "%dh%02dm", whole / 3600, whole / 60 % 60);
   return text;
 }
 

@@ -68,23 +68,24 @@ absl::Status run(const Options& o) {
 
 Command reference_command() {
   const auto o = std::make_shared<Options>();
-  return {"reference",
-          "Path-trace the irradiance that the bake approximates",
-          {{"SCENE", "level, .glb or .gltf", &o->scene, true},
-           {"-o,--output", "EXR to write: E in W/m², A, area", &o->output, true},
-           {"--lights", "lights.json that replaces the level's lights", &o->lights},
-           {"--rig", "which rig of --lights", &o->rig},
-           {"--bounces", "surfaces that light is reflected at on its way", &o->bounces},
-           {"--samples", "paths per texel or pixel", &o->samples},
-           {"--lightmap-size", "side of the scene atlas, texels; 0: from --texels-per-metre", &o->lightmap_size},
-           {"--texels-per-metre", "lightmap density; 0: chosen from the scene", &o->texels_per_metre},
-           {"--camera", "render this camera ('first': the first one) in place of the lightmap", &o->camera},
-           {"--width", "pixels across, with --camera", &o->width},
-           {"--footprint", "texel: average over the whole texel; cycles: as Blender Cycles 3.4 bakes do", &o->footprint},
-           {"--seed", "of the random numbers", &o->seed},
-           {"--threads", "0: one per hardware thread", &o->threads},
-           {"--json", "print the result as JSON", &o->json}},
-          [o] { return run(*o); }};
+  return {
+      "reference",
+      "Path-trace the irradiance that the bake approximates",
+      {{"SCENE", "level, .glb or .gltf", &o->scene, true},
+       {"-o,--output", "EXR to write: E in W/m², A, area", &o->output, true},
+       {"--lights", "lights.json that replaces the level's lights", &o->lights},
+       {"--rig", "which rig of --lights", &o->rig},
+       {"--bounces", "surfaces that light is reflected at on its way", &o->bounces},
+       {"--samples", "paths per texel or pixel", &o->samples},
+       {"--lightmap-size", "side of the scene atlas, texels; 0: from --texels-per-metre", &o->lightmap_size},
+       {"--texels-per-metre", "lightmap density; 0: chosen from the scene", &o->texels_per_metre},
+       {"--camera", "render this camera ('first': the first one) in place of the lightmap", &o->camera},
+       {"--width", "pixels across, with --camera", &o->width},
+       {"--footprint", "texel: average over the whole texel; cycles: as Blender Cycles 3.4 bakes do", &o->footprint},
+       {"--seed", "of the random numbers", &o->seed},
+       {"--threads", "0: one per hardware thread", &o->threads},
+       {"--json", "print the result as JSON", &o->json}},
+      [o] { return run(*o); }};
 }
 
 }  // namespace lightloom

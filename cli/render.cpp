@@ -44,13 +44,15 @@ absl::Status write_picture(const Options& o, const Level& level, const SurfaceEl
 }
 
 absl::Status check(const Options& o) {
-  if (o.output.empty() && o.lightmap.empty()) return absl::InvalidArgumentError("give -o PICTURE or --lightmap E.exr, or both");
+  if (o.output.empty() && o.lightmap.empty())
+    return absl::InvalidArgumentError("give -o PICTURE or --lightmap E.exr, or both");
   if (!o.output.empty() && !o.output.ends_with(".png") && !o.output.ends_with(".exr")) {
     return absl::InvalidArgumentError("-o must end in .png or .exr");
   }
   if (o.bounces < 0 || o.bounces > 1000) return absl::InvalidArgumentError("--bounces must be 0 to 1000");
   if (o.width < 1 || o.width > 16384) return absl::InvalidArgumentError("--width must be 1 to 16384");
-  if (o.samples < 1 || o.direct_samples < 1) return absl::InvalidArgumentError("--samples and --direct-samples must be ≥ 1");
+  if (o.samples < 1 || o.direct_samples < 1)
+    return absl::InvalidArgumentError("--samples and --direct-samples must be ≥ 1");
   if (o.device != "vulkan" && o.device != "cpu") return absl::InvalidArgumentError("--device must be vulkan or cpu");
   return absl::OkStatus();
 }
@@ -62,8 +64,8 @@ absl::Status run(const Options& o) {
   LL_ASSIGN_OR_RETURN(const SurfaceElements elements, load_surface_elements(o.loom, manifest, *level.scene));
 
   ProgressBar bar;
-  LL_ASSIGN_OR_RETURN(const SurfaceInputs inputs,
-                      light_surfaces(*level.tracer, elements, o.direct_samples, bar.parallel("direct light", o.threads)));
+  LL_ASSIGN_OR_RETURN(const SurfaceInputs inputs, light_surfaces(*level.tracer, elements, o.direct_samples,
+                                                                 bar.parallel("direct light", o.threads)));
   bar.finish();
   const auto start = std::chrono::steady_clock::now();
   PlayTimes times;

@@ -28,7 +28,8 @@ absl::Status check(const Options& o) {
   if (!o.scene.empty()) {
     LL_ASSIGN_OR_RETURN(const Scene scene, load_gltf(o.scene));
     if (scene_hash(scene) != m.scene_hash) {
-      return absl::FailedPreconditionError(o.loom + " is stale: the geometry of " + o.scene + " has changed; bake again");
+      return absl::FailedPreconditionError(o.loom + " is stale: the geometry of " + o.scene +
+                                           " has changed; bake again");
     }
   }
   return absl::OkStatus();

@@ -23,9 +23,7 @@ uint32_t jobs_of(uint32_t rank) { return std::max(1u, (rank + gpu::kJobColumns -
 uint64_t section_bytes(size_t section, uint64_t elements) {
   return std::max<uint64_t>(16, elements * kElementBytes[section]);
 }
-uint64_t aligned(uint64_t bytes) {
-  return (bytes + kSectionAlignment - 1) / kSectionAlignment * kSectionAlignment;
-}
+uint64_t aligned(uint64_t bytes) { return (bytes + kSectionAlignment - 1) / kSectionAlignment * kSectionAlignment; }
 
 template <class T>
 void append(std::vector<T>* to, const std::vector<T>& from) {
@@ -89,8 +87,7 @@ void PageBuilder::add(const SourceCell& cell) {
     for (const uint32_t p : c.probes) probes_.push_back(cell.probes[p]);
     append(&corrections_, c.correction);
     for (uint32_t o = 0; o < record.octets; ++o) octets_.push_back({index, o});
-    const auto first = static_cast<int64_t>(c.first_receiver),
-               last = first + static_cast<int64_t>(c.receivers);
+    const auto first = static_cast<int64_t>(c.first_receiver), last = first + static_cast<int64_t>(c.receivers);
     elements_.insert(elements_.end(), cell.elements.begin() + first, cell.elements.begin() + last);
     elements_.resize(octets_.size() * gpu::kOctet, gpu::kNoElement);
     uniforms_.insert(uniforms_.end(), cell.chunk.uniform.begin() + first, cell.chunk.uniform.begin() + last);

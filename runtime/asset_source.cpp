@@ -44,8 +44,7 @@ absl::StatusOr<AssetSource> AssetSource::open(std::span<const uint8_t> manifest,
   const Manifest& m = source.manifest_;
   if (m.params.relight_rays > kMaxRelightRays) {
     return absl::UnimplementedError("asset has " + std::to_string(m.params.relight_rays) +
-                                    " relight rays per probe; bake with at most " +
-                                    std::to_string(kMaxRelightRays));
+                                    " relight rays per probe; bake with at most " + std::to_string(kMaxRelightRays));
   }
 
   uint64_t elements = 0;
@@ -91,9 +90,8 @@ absl::StatusOr<SourceCell> AssetSource::cell(uint32_t index) const {
 
   SourceCell cell;
   cell.chunk = *std::move(decoded);
-  if (cell.chunk.order != static_cast<uint32_t>(manifest_.params.order) ||
-      cell.chunk.probe_count != entry.probes || cell.chunk.receivers.size() != entry.receivers ||
-      cell.chunk.clusters.size() != entry.clusters) {
+  if (cell.chunk.order != static_cast<uint32_t>(manifest_.params.order) || cell.chunk.probe_count != entry.probes ||
+      cell.chunk.receivers.size() != entry.receivers || cell.chunk.clusters.size() != entry.clusters) {
     return corrupt(what, "it does not match the manifest");
   }
   const auto objects = resolve(cell.chunk.objects);
@@ -144,8 +142,7 @@ absl::StatusOr<std::vector<uint8_t>> AssetSource::chunk(const ChunkRef& ref) con
   if (ref.size > kMaxChunkBytes) return corrupt("chunk " + ref.digest.hex(), "its size is above 1 GiB");
   std::vector<uint8_t> bytes(ref.size);
   LL_RETURN_IF_ERROR(read_(ref, bytes));
-  if (sha256(bytes) != ref.digest)
-    return corrupt("chunk " + ref.digest.hex(), "its bytes have another SHA-256");
+  if (sha256(bytes) != ref.digest) return corrupt("chunk " + ref.digest.hex(), "its bytes have another SHA-256");
   return bytes;
 }
 

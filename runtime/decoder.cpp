@@ -19,9 +19,7 @@ void add(Rgb* sum, double weight, Vec3 v) {
 void add(Rgb* sum, double weight, const Rgb& v) {
   for (size_t c = 0; c < 3; ++c) (*sum)[c] += weight * v[c];
 }
-Vec3 rounded(const Rgb& v) {
-  return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])};
-}
+Vec3 rounded(const Rgb& v) { return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])}; }
 
 /// λ_j = 4π/N · Σ_r Y_j(ω_r) · L_r.
 void relight(const std::vector<uint32_t>& rays, const std::vector<float>& sh, const DecodedFrame& frame,
@@ -97,8 +95,8 @@ absl::StatusOr<DecoderAsset> load_decoder_asset(const AssetSource& source) {
   return asset;
 }
 
-DecodedFrame decode_frame(const DecoderAsset& asset, const SurfaceLight& light,
-                          std::span<const Vec3> previous, const Parallel& how) {
+DecodedFrame decode_frame(const DecoderAsset& asset, const SurfaceLight& light, std::span<const Vec3> previous,
+                          const Parallel& how) {
   const size_t S = asset.surface_elements;
   LL_CHECK(light.direct.size() == S && light.albedo.size() == S && light.emission.size() == S);
   LL_CHECK(previous.size() == S);
@@ -115,8 +113,7 @@ DecodedFrame decode_frame(const DecoderAsset& asset, const SurfaceLight& light,
   const size_t N = asset.relight.empty() ? 0 : asset.relight[0].size();
   std::vector<float> sh(N * J);
   for (size_t r = 0; r < N; ++r) {
-    sh_evaluate(static_cast<int>(asset.order),
-                sphere_direction(static_cast<uint32_t>(r), static_cast<uint32_t>(N)),
+    sh_evaluate(static_cast<int>(asset.order), sphere_direction(static_cast<uint32_t>(r), static_cast<uint32_t>(N)),
                 std::span(sh).subspan(r * J, J));
   }
   frame.lambda.resize(asset.relight.size() * J);

@@ -36,7 +36,7 @@ struct DecodedFrame {
 
 /// One frame after `previous`, the E of the frame before (S, all 0 for the first bounce).
 /// REQUIRES: array sizes as above.
-DecodedFrame decode_frame(const DecoderAsset& asset, const SurfaceLight& light,
-                          std::span<const Vec3> previous, const Parallel& how = {});
+DecodedFrame decode_frame(const DecoderAsset& asset, const SurfaceLight& light, std::span<const Vec3> previous,
+                          const Parallel& how = {});
 
 }  // namespace lightloom

@@ -164,15 +164,13 @@ uint32_t lightloom_version(void) {
 lightloom_result lightloom_create(const lightloom_create_info* info, lightloom_runtime** out) {
   if (out == nullptr) return LIGHTLOOM_ERROR_INVALID_ARGUMENT;
   *out = nullptr;
-  if (info == nullptr || info->struct_size < sizeof(lightloom_create_info))
-    return LIGHTLOOM_ERROR_INVALID_ARGUMENT;
+  if (info == nullptr || info->struct_size < sizeof(lightloom_create_info)) return LIGHTLOOM_ERROR_INVALID_ARGUMENT;
   lightloom::RuntimeOptions options;
   options.messages = {info->message, info->message_user};
   return guarded(options.messages, [&]() -> absl::Status {
     constexpr uint32_t kKnown = LIGHTLOOM_CREATE_VALIDATION | LIGHTLOOM_CREATE_FORCE_STAGING;
     if ((info->flags & ~kKnown) != 0 || info->reserved != 0) {
-      return absl::InvalidArgumentError(
-          "lightloom_create_info has unknown flags or a reserved field that is not 0");
+      return absl::InvalidArgumentError("lightloom_create_info has unknown flags or a reserved field that is not 0");
     }
     options.validation = (info->flags & LIGHTLOOM_CREATE_VALIDATION) != 0;
     options.force_staging = (info->flags & LIGHTLOOM_CREATE_FORCE_STAGING) != 0;
@@ -192,8 +190,7 @@ lightloom_result lightloom_load(lightloom_runtime* runtime, const lightloom_asse
   return guarded(runtime->impl->messages(), [&]() -> absl::Status {
     if (info == nullptr || info->struct_size < sizeof(lightloom_asset_info) || info->manifest == nullptr ||
         info->read_chunk == nullptr || info->reserved != 0) {
-      return absl::InvalidArgumentError(
-          "lightloom_asset_info is null, its struct_size is wrong or a field is missing");
+      return absl::InvalidArgumentError("lightloom_asset_info is null, its struct_size is wrong or a field is missing");
     }
     const auto read = [info](const lightloom::ChunkRef& ref, std::span<uint8_t> bytes) -> absl::Status {
       if (info->read_chunk(info->read_user, ref.digest.bytes.data(), ref.size, bytes.data()) == 0) {
@@ -212,8 +209,8 @@ void lightloom_unload(lightloom_runtime* runtime) {
 lightloom_result lightloom_get_counts(const lightloom_runtime* runtime, lightloom_counts* counts) {
   return with_asset(runtime, [&](const lightloom::Runtime& r) {
     const auto& c = r.asset()->counts();
-    return lightloom::fill(lightloom_counts{sizeof(lightloom_counts), c.surface_elements, c.receivers,
-                                            c.probes, c.cells, c.clusters, c.pages, c.order, c.gpu_bytes},
+    return lightloom::fill(lightloom_counts{sizeof(lightloom_counts), c.surface_elements, c.receivers, c.probes,
+                                            c.cells, c.clusters, c.pages, c.order, c.gpu_bytes},
                            counts);
   });
 }
@@ -226,8 +223,8 @@ lightloom_result lightloom_set_albedo(lightloom_runtime* runtime, const float* r
   return lightloom::set_array(runtime, lightloom::SurfaceArray::kAlbedo, "albedo", rgb, elements, 0, 1);
 }
 lightloom_result lightloom_set_emission(lightloom_runtime* runtime, const float* rgb, uint64_t elements) {
-  return lightloom::set_array(runtime, lightloom::SurfaceArray::kEmission, "emission", rgb, elements,
-                              -lightloom::kMax, lightloom::kMax);
+  return lightloom::set_array(runtime, lightloom::SurfaceArray::kEmission, "emission", rgb, elements, -lightloom::kMax,
+                              lightloom::kMax);
 }
 lightloom_result lightloom_set_environment(lightloom_runtime* runtime, const float rgb[3]) {
   return with_asset(runtime, [&](lightloom::Runtime& r) -> absl::Status {
@@ -258,10 +255,9 @@ lightloom_result lightloom_get_stats(const lightloom_runtime* runtime, lightloom
     const auto& s = r.stats();
     const auto& c = r.asset()->counts();
     const auto& ms = s.milliseconds;
-    return lightloom::fill(
-        lightloom_stats{sizeof(lightloom_stats), s.frames, s.timestamps ? 1u : 0u, 0, ms[0], ms[1], ms[2],
-                        ms[3], c.relight_bytes, c.project_bytes, c.receive_bytes},
-        stats);
+    return lightloom::fill(lightloom_stats{sizeof(lightloom_stats), s.frames, s.timestamps ? 1u : 0u, 0, ms[0], ms[1],
+                                           ms[2], ms[3], c.relight_bytes, c.project_bytes, c.receive_bytes},
+                           stats);
   });
 }
 

@@ -49,14 +49,12 @@ absl::Status Runtime::load(std::span<const uint8_t> manifest, ReadChunk read) {
   unload();
   stats_ = {};
   LL_ASSIGN_OR_RETURN(const AssetSource source, AssetSource::open(manifest, std::move(read)));
-  LL_ASSIGN_OR_RETURN(asset_,
-                      GpuAsset::load(device_.get(), transfer_.get(), pipelines_.get(), source, limits_));
+  LL_ASSIGN_OR_RETURN(asset_, GpuAsset::load(device_.get(), transfer_.get(), pipelines_.get(), source, limits_));
   return absl::OkStatus();
 }
 
 absl::Status Runtime::set(SurfaceArray array, std::span<const float> rgb) {
-  return transfer_->upload(asset_->array(array),
-                           {reinterpret_cast<const uint8_t*>(rgb.data()), rgb.size_bytes()});
+  return transfer_->upload(asset_->array(array), {reinterpret_cast<const uint8_t*>(rgb.data()), rgb.size_bytes()});
 }
 
 absl::Status Runtime::update(uint32_t iterations) {

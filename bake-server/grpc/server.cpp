@@ -24,8 +24,7 @@ class JobService final : public v1::JobService::CallbackService {
  public:
   explicit JobService(ServerInfo info) : info_(std::move(info)) {}
 
-  grpc::ServerUnaryReactor* GetServerInfo(grpc::CallbackServerContext* context,
-                                          const v1::GetServerInfoRequest*,
+  grpc::ServerUnaryReactor* GetServerInfo(grpc::CallbackServerContext* context, const v1::GetServerInfoRequest*,
                                           v1::ServerInfo* response) override {
     response->set_version(info_.version);
     response->set_protocol_version(info_.protocol_version);
@@ -68,8 +67,8 @@ class WorkerService final : public v1::WorkerService::CallbackService {
                             .threads = request->threads()};
     const Admission admission = admit(worker, info_);
     if (admission.accepted()) {
-      spdlog::info("worker {} joined: version {}, {} threads", context->peer(),
-                   printable(request->version(), 64), worker.threads);
+      spdlog::info("worker {} joined: version {}, {} threads", context->peer(), printable(request->version(), 64),
+                   worker.threads);
       response->mutable_accepted()->set_server_version(info_.version);
     } else {
       spdlog::warn("worker {} refused: {}", context->peer(), admission.message);

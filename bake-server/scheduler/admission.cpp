@@ -13,8 +13,7 @@ constexpr size_t kShownVersion = 64;  // bytes of a worker's version string that
 Admission admit(const WorkerInfo& worker, const ServerInfo& server) {
   // Written without subtraction: a server of protocol 1 has no predecessor, and 0 means that the field was
   // not sent.
-  const bool protocol_fits = worker.protocol_version >= 1 &&
-                             worker.protocol_version <= server.protocol_version &&
+  const bool protocol_fits = worker.protocol_version >= 1 && worker.protocol_version <= server.protocol_version &&
                              worker.protocol_version + 1 >= server.protocol_version;
   if (!protocol_fits) {
     const char* to_upgrade = worker.protocol_version > server.protocol_version ? "server" : "worker";
@@ -24,9 +23,9 @@ Admission admit(const WorkerInfo& worker, const ServerInfo& server) {
   }
   if (worker.method_version != server.method_version) {
     return {Refusal::kMethodVersion,
-            absl::StrCat("the worker bakes by method version '",
-                         printable(worker.method_version, kShownVersion), "', the server asks for '",
-                         server.method_version, "': install the same release of lightloom on both")};
+            absl::StrCat("the worker bakes by method version '", printable(worker.method_version, kShownVersion),
+                         "', the server asks for '", server.method_version,
+                         "': install the same release of lightloom on both")};
   }
   if (!worker.avx2) {
     return {Refusal::kMissingAvx2,

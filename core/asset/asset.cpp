@@ -107,8 +107,7 @@ absl::Status verify_asset(const std::filesystem::path& loom) {
     LL_ASSIGN_OR_RETURN(const auto bytes, store.get(m.probes[i].relight));
     const auto chunk = decode_relight(bytes);
     if (!chunk.ok()) return in_context(chunk.status(), what);
-    if (chunk->rays.size() != static_cast<size_t>(m.params.relight_rays) ||
-        chunk->position != m.probes[i].position) {
+    if (chunk->rays.size() != static_cast<size_t>(m.params.relight_rays) || chunk->position != m.probes[i].position) {
       return mismatch(what);
     }
     for (const ChunkObject& o : chunk->objects) LL_RETURN_IF_ERROR(check_object(objects, o, what));

@@ -233,7 +233,8 @@ absl::StatusOr<RelightChunk> decode_relight(std::span<const uint8_t> bytes) {
   ByteReader r(bytes);
   const auto header = r.value<RelightHeader>();
   if (header.magic != kRelightMagic) return corrupt("relight", "it does not start with LLCR");
-  if (header.version != kVersion) return corrupt("relight", "version " + std::to_string(header.version) + " is unknown");
+  if (header.version != kVersion)
+    return corrupt("relight", "version " + std::to_string(header.version) + " is unknown");
   RelightChunk c;
   c.position = header.position;
   c.objects = r.array<ChunkObject>(header.objects);
@@ -252,8 +253,7 @@ absl::StatusOr<RelightChunk> decode_relight(std::span<const uint8_t> bytes) {
 }
 
 std::vector<uint8_t> encode_surface(const SurfaceChunk& c) {
-  LL_CHECK(c.positions.size() == c.keys.size() && c.normals.size() == c.keys.size() &&
-           c.areas.size() == c.keys.size());
+  LL_CHECK(c.positions.size() == c.keys.size() && c.normals.size() == c.keys.size() && c.areas.size() == c.keys.size());
   std::vector<uint32_t> normals;
   normals.reserve(c.normals.size());
   for (const Vec3 n : c.normals) normals.push_back(encode_normal(n));
@@ -270,7 +270,8 @@ absl::StatusOr<SurfaceChunk> decode_surface(std::span<const uint8_t> bytes) {
   ByteReader r(bytes);
   const auto header = r.value<SurfaceHeader>();
   if (header.magic != kSurfaceMagic) return corrupt("surface", "it does not start with LLCS");
-  if (header.version != kVersion) return corrupt("surface", "version " + std::to_string(header.version) + " is unknown");
+  if (header.version != kVersion)
+    return corrupt("surface", "version " + std::to_string(header.version) + " is unknown");
   SurfaceChunk c;
   c.object = header.object;
   c.keys = r.array<uint32_t>(header.texels);

@@ -51,11 +51,11 @@ struct CellChunk {
   };
 
   uint32_t order = 0;
-  uint32_t probe_count = 0;           ///< length of the cell's probe list in the manifest
+  uint32_t probe_count = 0;  ///< length of the cell's probe list in the manifest
   std::vector<ChunkObject> objects;
-  std::vector<TexelRef> receivers;    ///< in cluster order
-  std::vector<uint16_t> uniform;      ///< per receiver: irradiance under the uniform field 1, unorm16 of π
-  std::vector<Cluster> clusters;      ///< cover the receivers in order, none empty
+  std::vector<TexelRef> receivers;  ///< in cluster order
+  std::vector<uint16_t> uniform;    ///< per receiver: irradiance under the uniform field 1, unorm16 of π
+  std::vector<Cluster> clusters;    ///< cover the receivers in order, none empty
 };
 
 /// What one probe sees along sphere_direction(i, n), i = 0..n-1.

@@ -74,22 +74,20 @@ absl::Status corrupt(std::string_view why) {
 bool valid(const BakeParams& p) {
   return p.order >= 0 && p.order <= kMaxShOrder && p.spacing > 0 && std::isfinite(p.spacing) && p.links >= 1 &&
          p.rays >= 1 && p.relight_rays >= 1 && p.max_rank >= 0 && p.threshold >= 0 && std::isfinite(p.threshold) &&
-         p.cell_receivers >= 1 && p.texels_per_metre >= 0 && std::isfinite(p.texels_per_metre) &&
-         p.lightmap_size >= 0;
+         p.cell_receivers >= 1 && p.texels_per_metre >= 0 && std::isfinite(p.texels_per_metre) && p.lightmap_size >= 0;
 }
 
 bool is_finite(const Aabb& box) { return is_finite(box.lo) && is_finite(box.hi); }
 
-bool in_range(uint32_t first, uint32_t count, size_t size) {
-  return first <= size && count <= size - first;
-}
+bool in_range(uint32_t first, uint32_t count, size_t size) { return first <= size && count <= size - first; }
 
 absl::Status validate(const Manifest& m) {
   if (!valid(m.params)) return corrupt("a parameter is out of range");
   if (m.width < 0 || m.height < 0 || m.width > 1 << 16 || m.height > 1 << 16) {
     return corrupt("the lightmap image's size is out of range");
   }
-  if (!is_finite(m.bounds) && !(m.bounds.lo == Aabb{}.lo && m.bounds.hi == Aabb{}.hi)) return corrupt("its bounds are not finite");
+  if (!is_finite(m.bounds) && !(m.bounds.lo == Aabb{}.lo && m.bounds.hi == Aabb{}.hi))
+    return corrupt("its bounds are not finite");
   for (const ObjectEntry& o : m.objects) {
     if (o.width < 0 || o.height < 0 || o.x < 0 || o.y < 0 || o.width > m.width - o.x || o.height > m.height - o.y) {
       return corrupt("object '" + printable(o.name) + "' lies outside the lightmap image");
@@ -125,8 +123,8 @@ std::vector<uint8_t> encode_manifest(const Manifest& m) {
   std::string strings = m.method_version;
   std::vector<ObjectRecord> objects;
   for (const ObjectEntry& o : m.objects) {
-    objects.push_back({o.id, o.width, o.height, o.x, o.y, o.surface.digest, o.surface.size,
-                       static_cast<uint32_t>(o.name.size()), 0});
+    objects.push_back(
+        {o.id, o.width, o.height, o.x, o.y, o.surface.digest, o.surface.size, static_cast<uint32_t>(o.name.size()), 0});
     strings += o.name;
   }
   std::vector<ProbeRecord> probes;
@@ -135,8 +133,8 @@ std::vector<uint8_t> encode_manifest(const Manifest& m) {
   }
   std::vector<CellRecord> cells;
   for (const CellEntry& c : m.cells) {
-    cells.push_back({c.level, c.cell, c.bounds.lo, c.bounds.hi, c.receivers, c.first_cluster, c.clusters,
-                     c.first_probe, c.probes, c.error, c.unseen, 0, c.chunk.digest, c.chunk.size});
+    cells.push_back({c.level, c.cell, c.bounds.lo, c.bounds.hi, c.receivers, c.first_cluster, c.clusters, c.first_probe,
+                     c.probes, c.error, c.unseen, 0, c.chunk.digest, c.chunk.size});
   }
   std::vector<ClusterRecord> clusters;
   for (const ClusterEntry& c : m.clusters) {
@@ -218,14 +216,22 @@ absl::StatusOr<Manifest> decode_manifest(std::span<const uint8_t> bytes) {
   m.height = header.height;
   m.bounds = {header.lo, header.hi};
   for (const ObjectRecord& o : objects) {
-    m.objects.push_back(
-        {o.id, next_string(o.name_bytes), o.width, o.height, o.x, o.y, {o.surface, o.surface_size}});
+    m.objects.push_back({o.id, next_string(o.name_bytes), o.width, o.height, o.x, o.y, {o.surface, o.surface_size}});
   }
   if (!strings_ok || at != strings.size()) return corrupt("its strings do not match their sizes");
   for (const ProbeRecord& p : probes) m.probes.push_back({p.position, p.cell, p.slot, {p.relight, p.relight_size}});
   for (const CellRecord& c : cells) {
-    m.cells.push_back({c.level, c.cell, {c.lo, c.hi}, c.receivers, c.first_cluster, c.clusters, c.first_probe,
-                       c.probes, {c.chunk, c.chunk_size}, c.error, c.unseen});
+    m.cells.push_back({c.level,
+                       c.cell,
+                       {c.lo, c.hi},
+                       c.receivers,
+                       c.first_cluster,
+                       c.clusters,
+                       c.first_probe,
+                       c.probes,
+                       {c.chunk, c.chunk_size},
+                       c.error,
+                       c.unseen});
   }
   for (const ClusterRecord& c : clusters) m.clusters.push_back({{c.lo, c.hi}, c.receivers, c.rank, c.probes, c.error});
   LL_RETURN_IF_ERROR(validate(m));

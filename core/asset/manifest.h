@@ -16,16 +16,16 @@ namespace lightloom {
 
 /// Everything that the baked numbers depend on besides the scene. Recorded in the asset; a rebake uses the same.
 struct BakeParams {
-  int32_t order = 7;               ///< SH order n of the probes
-  float spacing = 0;               ///< ρ, side of a probe cell, metres; 0 in a request: chosen from the scene
-  int32_t links = 6;               ///< k, probes per receiver
-  int32_t rays = 256;              ///< gather rays per receiver, a square number
-  int32_t relight_rays = 4096;     ///< per probe
-  int32_t max_rank = 32;           ///< coefficients per cluster, without the uniform one
-  float threshold = 0.05f;         ///< relative Frobenius error at which a cluster's rank ends
-  int32_t cell_receivers = 1024;   ///< a bake cell holds fewer receivers than this
-  float texels_per_metre = 0;      ///< lightmap density; 0 in a request: chosen from the scene
-  int32_t lightmap_size = 0;       ///< side of the scene atlas; 0: from texels_per_metre
+  int32_t order = 7;              ///< SH order n of the probes
+  float spacing = 0;              ///< ρ, side of a probe cell, metres; 0 in a request: chosen from the scene
+  int32_t links = 6;              ///< k, probes per receiver
+  int32_t rays = 256;             ///< gather rays per receiver, a square number
+  int32_t relight_rays = 4096;    ///< per probe
+  int32_t max_rank = 32;          ///< coefficients per cluster, without the uniform one
+  float threshold = 0.05f;        ///< relative Frobenius error at which a cluster's rank ends
+  int32_t cell_receivers = 1024;  ///< a bake cell holds fewer receivers than this
+  float texels_per_metre = 0;     ///< lightmap density; 0 in a request: chosen from the scene
+  int32_t lightmap_size = 0;      ///< side of the scene atlas; 0: from texels_per_metre
   uint64_t seed = 0;
 
   bool operator==(const BakeParams&) const = default;
@@ -39,7 +39,7 @@ struct ChunkRef {
 };
 
 struct ObjectEntry {
-  Digest id;                  ///< Object::id
+  Digest id;  ///< Object::id
   std::string name;
   int32_t width = 0, height = 0;  ///< of the local lightmap, texels
   int32_t x = 0, y = 0;           ///< of local texel (0,0) in the lightmap image
@@ -61,30 +61,30 @@ struct ProbeEntry {
 struct CellEntry {
   int32_t level = 0;  ///< the octree cell covers [i, i+1)·2^level metres on each axis
   GridCell cell{};
-  Aabb bounds;        ///< of its receivers
+  Aabb bounds;  ///< of its receivers
   uint32_t receivers = 0;
   uint32_t first_cluster = 0, clusters = 0;  ///< range of Manifest::clusters
   uint32_t first_probe = 0, probes = 0;      ///< range of Manifest::cell_probes
   ChunkRef chunk;
-  float error = 0;            ///< ‖T − T̃‖_F ÷ ‖T‖_F
-  float unseen = 0;           ///< share of gather rays whose hit no linked probe sees
+  float error = 0;   ///< ‖T − T̃‖_F ÷ ‖T‖_F
+  float unseen = 0;  ///< share of gather rays whose hit no linked probe sees
 };
 
 struct ClusterEntry {
   Aabb bounds;
   uint32_t receivers = 0;
-  uint32_t rank = 0;   ///< without the uniform column
+  uint32_t rank = 0;  ///< without the uniform column
   uint32_t probes = 0;
-  float error = 0;     ///< as CellEntry::error
+  float error = 0;  ///< as CellEntry::error
 };
 
 struct Manifest {
   std::string method_version;
-  Digest scene_hash;   ///< of all that the transport depends on: see scene_hash()
-  BakeParams params;   ///< with nothing left to choose
-  uint32_t layout_mode = 0;  ///< LayoutMode
+  Digest scene_hash;              ///< of all that the transport depends on: see scene_hash()
+  BakeParams params;              ///< with nothing left to choose
+  uint32_t layout_mode = 0;       ///< LayoutMode
   int32_t width = 0, height = 0;  ///< of the lightmap image
-  Aabb bounds;         ///< of the static geometry
+  Aabb bounds;                    ///< of the static geometry
   std::vector<ObjectEntry> objects;
   std::vector<ProbeEntry> probes;
   std::vector<CellEntry> cells;

@@ -51,9 +51,10 @@ Manifest assemble(const Plan& plan, const Scene& scene, const std::vector<CellRe
     entry.probes = static_cast<uint32_t>(c.probe_ids.size());
     entry.chunk = cell_refs[i];
     entry.error = static_cast<float>(c.error);
-    entry.unseen = c.stats.gather_rays > 0
-                       ? static_cast<float>(static_cast<double>(c.stats.unseen) / static_cast<double>(c.stats.gather_rays))
-                       : 0;
+    entry.unseen =
+        c.stats.gather_rays > 0
+            ? static_cast<float>(static_cast<double>(c.stats.unseen) / static_cast<double>(c.stats.gather_rays))
+            : 0;
     for (const CellChunk::Cluster& k : c.chunk.clusters) {
       m.clusters.push_back({k.bounds, k.receivers, k.rank(), static_cast<uint32_t>(k.probes.size()), k.error});
     }

@@ -70,7 +70,9 @@ absl::StatusOr<BakeReport> bake(const RayTracer& tracer, const BakeParams& param
   std::atomic<uint64_t> rays{0};
   Parallel cell_stage = control.stage("cells");
   if (control.progress) {
-    cell_stage.progress = [&](uint64_t finished, uint64_t total) { control.progress("cells", finished, total, rays.load()); };
+    cell_stage.progress = [&](uint64_t finished, uint64_t total) {
+      control.progress("cells", finished, total, rays.load());
+    };
   }
   bool done = parallel_for(cells.size(), cell_stage, [&](uint64_t i) {
     cells[i] = bake_cell(tracer, make_cell_task(plan, scene, plan.cells[i]));

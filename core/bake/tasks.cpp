@@ -34,7 +34,8 @@ CellTask make_cell_task(const Plan& plan, const Scene& scene, const PlannedCell&
   CellTask task;
   task.params = plan.params;
   task.seed = hash_combine(plan.params.seed, static_cast<uint64_t>(static_cast<uint32_t>(cell.level)));
-  for (const int32_t i : cell.cell) task.seed = hash_combine(task.seed, static_cast<uint64_t>(static_cast<uint32_t>(i)));
+  for (const int32_t i : cell.cell)
+    task.seed = hash_combine(task.seed, static_cast<uint64_t>(static_cast<uint32_t>(i)));
 
   // Objects by id.
   std::map<Digest, uint32_t> object_of;
@@ -82,11 +83,12 @@ CellResult bake_cell(const RayTracer& tracer, const CellTask& task) {
 
   // Transport: one row α_x per receiver.
   auto start = std::chrono::steady_clock::now();
-  Matrix transport = Matrix::Zero(static_cast<Eigen::Index>(task.receivers.size()),
-                                  static_cast<Eigen::Index>(task.probes.size()) * J);
+  Matrix transport =
+      Matrix::Zero(static_cast<Eigen::Index>(task.receivers.size()), static_cast<Eigen::Index>(task.probes.size()) * J);
   std::vector<Vec3> positions;
   for (size_t r = 0; r < task.receivers.size(); ++r) {
-    const std::span<float> row(transport.row(static_cast<Eigen::Index>(r)).data(), static_cast<size_t>(transport.cols()));
+    const std::span<float> row(transport.row(static_cast<Eigen::Index>(r)).data(),
+                               static_cast<size_t>(transport.cols()));
     out.stats += gather_row(tracer, task.receivers[r], task.probes, gather, row);
     positions.push_back(task.receivers[r].point.position);
     out.bounds.extend(positions.back());

@@ -15,11 +15,11 @@ namespace lightloom {
 struct CellTask {
   BakeParams params;
   std::vector<ChunkObject> objects;
-  std::vector<TexelRef> texels;         ///< per receiver
-  std::vector<GatherPoint> receivers;   ///< `near` indexes `probes`
+  std::vector<TexelRef> texels;        ///< per receiver
+  std::vector<GatherPoint> receivers;  ///< `near` indexes `probes`
   std::vector<Vec3> probes;
-  std::vector<uint32_t> probe_ids;      ///< the plan's index of each probe
-  uint64_t seed = 0;                    ///< of the cell's level and coordinates
+  std::vector<uint32_t> probe_ids;  ///< the plan's index of each probe
+  uint64_t seed = 0;                ///< of the cell's level and coordinates
 };
 
 struct CellResult {

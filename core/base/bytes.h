@@ -20,13 +20,11 @@ static_assert(std::endian::native == std::endian::little, "stored structures are
 class ByteWriter {
  public:
   template <class T>
-    requires std::is_trivially_copyable_v<T>
-  void value(const T& v) {
-    raw(&v, sizeof v);
-  }
+  requires std::is_trivially_copyable_v<T>
+  void value(const T& v) { raw(&v, sizeof v); }
   /// Elements only; the count is written by the caller, in the header. Padded to 16 bytes before.
   template <class T>
-    requires std::is_trivially_copyable_v<T>
+  requires std::is_trivially_copyable_v<T>
   void array(const std::vector<T>& v) {
     align();
     raw(v.data(), v.size() * sizeof(T));
@@ -52,16 +50,14 @@ class ByteReader {
   explicit ByteReader(std::span<const uint8_t> bytes) : bytes_(bytes) {}
 
   template <class T>
-    requires std::is_trivially_copyable_v<T>
-  T value() {
+  requires std::is_trivially_copyable_v<T> T value() {
     T v{};
     if (take(sizeof v)) std::memcpy(&v, bytes_.data() + at_ - sizeof v, sizeof v);
     return v;
   }
   /// Fails without allocating if fewer than `count` elements are left.
   template <class T>
-    requires std::is_trivially_copyable_v<T>
-  std::vector<T> array(uint64_t count) {
+  requires std::is_trivially_copyable_v<T> std::vector<T> array(uint64_t count) {
     align();
     std::vector<T> v;
     if (count > (bytes_.size() - at_) / sizeof(T)) {

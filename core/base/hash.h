@@ -32,10 +32,7 @@ class Hasher {
   /// Length first, so that ("ab","c") and ("a","bc") differ.
   Hasher& string(std::string_view s);
   template <class T>
-    requires(std::is_arithmetic_v<T> || std::is_enum_v<T>)
-  Hasher& value(T v) {
-    return bytes(&v, sizeof v);
-  }
+  requires(std::is_arithmetic_v<T> || std::is_enum_v<T>) Hasher& value(T v) { return bytes(&v, sizeof v); }
   template <class T>
   Hasher& array(const std::vector<T>& v) {
     static_assert(std::has_unique_object_representations_v<T> || std::is_trivially_copyable_v<T>);

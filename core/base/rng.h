@@ -26,9 +26,7 @@ class Rng {
   /// Uniform in [0, 1), a multiple of 2^-24: exact in float.
   float next_float() { return static_cast<float>(next_u64() >> 40) * 0x1p-24f; }
   /// Uniform in [0, n). REQUIRES: n > 0. Bias below 2^-32 n.
-  uint32_t next_below(uint32_t n) {
-    return static_cast<uint32_t>((static_cast<uint64_t>(next_u32()) * n) >> 32);
-  }
+  uint32_t next_below(uint32_t n) { return static_cast<uint32_t>((static_cast<uint64_t>(next_u32()) * n) >> 32); }
 
  private:
   uint64_t state_;

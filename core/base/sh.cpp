@@ -92,10 +92,18 @@ void sincos_2pi(float u, float* sine, float* cosine) {
   const double s = x * (1 - x2 / 6 * (1 - x2 / 20 * (1 - x2 / 42 * (1 - x2 / 72 * (1 - x2 / 110)))));
   const double c = 1 - x2 / 2 * (1 - x2 / 12 * (1 - x2 / 30 * (1 - x2 / 56 * (1 - x2 / 90))));
   switch (static_cast<int>(quarter) & 3) {
-    case 0: *sine = static_cast<float>(s), *cosine = static_cast<float>(c); break;
-    case 1: *sine = static_cast<float>(c), *cosine = static_cast<float>(-s); break;
-    case 2: *sine = static_cast<float>(-s), *cosine = static_cast<float>(-c); break;
-    default: *sine = static_cast<float>(-c), *cosine = static_cast<float>(s); break;
+    case 0:
+      *sine = static_cast<float>(s), *cosine = static_cast<float>(c);
+      break;
+    case 1:
+      *sine = static_cast<float>(c), *cosine = static_cast<float>(-s);
+      break;
+    case 2:
+      *sine = static_cast<float>(-s), *cosine = static_cast<float>(-c);
+      break;
+    default:
+      *sine = static_cast<float>(-c), *cosine = static_cast<float>(s);
+      break;
   }
 }
 

@@ -6,8 +6,8 @@
 
 #include <utility>
 
-#define LL_RETURN_IF_ERROR(expression)                       \
-  do {                                                       \
+#define LL_RETURN_IF_ERROR(expression)                                               \
+  do {                                                                               \
     if (absl::Status ll_status_ = (expression); !ll_status_.ok()) return ll_status_; \
   } while (0)
 
@@ -15,7 +15,7 @@
 #define LL_CONCAT(a, b) LL_CONCAT_INNER(a, b)
 /// LL_ASSIGN_OR_RETURN(auto x, f()): x = f()'s value, or returns its error.
 #define LL_ASSIGN_OR_RETURN(lhs, expression) LL_ASSIGN_IMPL(LL_CONCAT(ll_or_, __LINE__), lhs, expression)
-#define LL_ASSIGN_IMPL(temporary, lhs, expression)        \
-  auto temporary = (expression);                          \
-  if (!temporary.ok()) return temporary.status();         \
+#define LL_ASSIGN_IMPL(temporary, lhs, expression) \
+  auto temporary = (expression);                   \
+  if (!temporary.ok()) return temporary.status();  \
   lhs = std::move(*temporary)

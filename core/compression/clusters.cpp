@@ -20,9 +20,8 @@ Block extract(const Matrix& transport, std::span<const uint32_t> rows, Eigen::In
   Block block;
   const Eigen::Index probes = transport.cols() / J;
   for (Eigen::Index p = 0; p < probes; ++p) {
-    const bool used = std::any_of(rows.begin(), rows.end(), [&](uint32_t r) {
-      return (transport.row(r).segment(p * J, J).array() != 0).any();
-    });
+    const bool used = std::any_of(rows.begin(), rows.end(),
+                                  [&](uint32_t r) { return (transport.row(r).segment(p * J, J).array() != 0).any(); });
     if (used) block.probes.push_back(static_cast<uint32_t>(p));
   }
   block.t.resize(static_cast<Eigen::Index>(rows.size()), static_cast<Eigen::Index>(block.probes.size()) * J);
@@ -117,7 +116,8 @@ CellChunk::Cluster quantise(const Truncated& t, std::span<const uint32_t> rows, 
     }
     c.correction.push_back(static_cast<float>(correction));
     for (size_t r = 0; r < rows.size(); ++r) {
-      c.reconstruction[k * padded + r] = float_to_half(t.svd.u(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(k)));
+      c.reconstruction[k * padded + r] =
+          float_to_half(t.svd.u(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(k)));
     }
   }
   for (const uint32_t r : rows) c.bounds.extend(positions[r]);
@@ -129,7 +129,7 @@ CellChunk::Cluster quantise(const Truncated& t, std::span<const uint32_t> rows, 
 
 CompressedCell compress_cell(const Matrix& transport, std::span<const Vec3> positions,
                              const CompressionOptions& options) {
-  LL_CHECK(static_cast<size_t>(transport.rows()) == positions.size());
+  LL_CHECK(static_cast<size_t>(transport.rows()) == positions.size() && options.min_receivers > 0);
   const std::vector<float> u = sh_uniform(options.order, options.relight_rays);
   CompressedCell out;
   double error2 = 0, norm2 = 0;
@@ -182,7 +182,8 @@ std::vector<float> decode_cluster(const CellChunk::Cluster& c, std::span<const u
     double ck = -static_cast<double>(c.correction[k]) * c0;
     for (size_t p = 0; p < probes; ++p) {
       for (size_t j = 0; j < J; ++j) {
-        ck += static_cast<double>(half_to_float(c.projection[(k * probes + p) * stride + j])) * lambda[c.probes[p] * J + j];
+        ck += static_cast<double>(half_to_float(c.projection[(k * probes + p) * stride + j])) *
+              lambda[c.probes[p] * J + j];
       }
     }
     for (size_t r = 0; r < e.size(); ++r) e[r] += half_to_float(c.reconstruction[k * padded + r]) * ck;

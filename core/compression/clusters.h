@@ -15,17 +15,17 @@ namespace lightloom {
 struct CompressionOptions {
   int order = 7;
   int max_rank = 32;
-  float threshold = 0.05f;      ///< relative Frobenius error at which the rank ends
-  uint32_t min_receivers = 128; ///< a cluster is not split below this many receivers
-  uint32_t relight_rays = 0;    ///< of the probes: the uniform field that is kept is sh_uniform(order, relight_rays)
+  float threshold = 0.05f;       ///< relative Frobenius error at which the rank ends
+  uint32_t min_receivers = 128;  ///< > 0: a cluster is not split below this many receivers
+  uint32_t relight_rays = 0;     ///< of the probes: the uniform field that is kept is sh_uniform(order, relight_rays)
   uint64_t seed = 0;
 };
 
 struct CompressedCell {
-  std::vector<uint32_t> order;      ///< receivers in cluster order, indices into the rows of T
-  std::vector<uint16_t> uniform;    ///< as CellChunk::uniform
+  std::vector<uint32_t> order;    ///< receivers in cluster order, indices into the rows of T
+  std::vector<uint16_t> uniform;  ///< as CellChunk::uniform
   std::vector<CellChunk::Cluster> clusters;
-  double error = 0;                 ///< ‖T − T̃‖ ÷ ‖T‖ over the cell, in the weighted norm
+  double error = 0;  ///< ‖T − T̃‖ ÷ ‖T‖ over the cell, in the weighted norm
 };
 
 /// T: receivers × (probes·J), E = T·λ. A cluster whose error stays above the threshold at max_rank is split at the median
@@ -33,7 +33,8 @@ struct CompressedCell {
 ///
 /// Errors are measured on T·W, W falling with the band l of a column as 1/(1+l): a level's light has far less energy in
 /// high bands, and so does what truncation there costs.
-CompressedCell compress_cell(const Matrix& transport, std::span<const Vec3> positions, const CompressionOptions& options);
+CompressedCell compress_cell(const Matrix& transport, std::span<const Vec3> positions,
+                             const CompressionOptions& options);
 
 /// T̃·λ as a runtime computes it from the stored numbers (chunk.h), for tests. λ: probes × sh_count, one colour.
 std::vector<float> decode_cluster(const CellChunk::Cluster& cluster, std::span<const uint16_t> uniform, int order,

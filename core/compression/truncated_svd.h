@@ -13,9 +13,9 @@ using Matrix = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMa
 
 /// A ≈ U · (ΣVᵀ), singular values descending.
 struct TruncatedSvd {
-  Matrix u;                 ///< rows(A) × K, orthonormal columns
-  Matrix sv;                ///< K × cols(A), row k has norm σ_k
-  Eigen::VectorXd sigma;    ///< K
+  Matrix u;               ///< rows(A) × K, orthonormal columns
+  Matrix sv;              ///< K × cols(A), row k has norm σ_k
+  Eigen::VectorXd sigma;  ///< K
 };
 
 /// K = max_rank, less where A has fewer rows, columns or non-zero singular values. Random test vectors depend on `seed`

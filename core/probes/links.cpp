@@ -9,7 +9,8 @@ ProbeGrid::ProbeGrid(std::span<const Probe> probes, float spacing) : probes_(pro
 
 std::vector<ProbeGrid::Near> ProbeGrid::nearest(Vec3 p, int count) const {
   std::array<int32_t, 3> home{};
-  for (int a = 0; a < 3; ++a) home[static_cast<size_t>(a)] = static_cast<int32_t>(std::floor(static_cast<double>(p[a]) / spacing_));
+  for (int a = 0; a < 3; ++a)
+    home[static_cast<size_t>(a)] = static_cast<int32_t>(std::floor(static_cast<double>(p[a]) / spacing_));
   std::vector<Near> found;
   const auto add_row = [&](int32_t x, int32_t y, int32_t z0, int32_t z1) {
     const auto key_less = [](const Probe& a, const std::array<int32_t, 3>& cell) { return a.cell < cell; };

@@ -20,9 +20,7 @@ class ProbeGrid {
   struct Near {
     float distance2;  ///< m²
     uint32_t probe;
-    bool operator<(const Near& o) const {
-      return distance2 != o.distance2 ? distance2 < o.distance2 : probe < o.probe;
-    }
+    bool operator<(const Near& o) const { return distance2 != o.distance2 ? distance2 < o.distance2 : probe < o.probe; }
   };
   /// The `count` probes nearest to p (fewer if there are not as many within kReach cells), nearest first, ties by index.
   /// REQUIRES: count > 0; p within 2^30 cells of the origin.

@@ -15,16 +15,17 @@ namespace {
 
 using Cell = std::array<int32_t, 3>;
 
-constexpr int kCandidates = 24;       // fixed points per cell, tried in order
-constexpr float kClearance = 0.15f;   // of the spacing
-constexpr uint32_t kSpaceRays = 24;   // rays that tell open space from solid
-constexpr size_t kTestReceivers = 64; // per cell, for repair
+constexpr int kCandidates = 24;        // fixed points per cell, tried in order
+constexpr float kClearance = 0.15f;    // of the spacing
+constexpr uint32_t kSpaceRays = 24;    // rays that tell open space from solid
+constexpr size_t kTestReceivers = 64;  // per cell, for repair
 constexpr uint32_t kTestRaysSide = 4;
-constexpr double kRepairShare = 0.01; // unseen share of a cell's test rays that calls for repair
+constexpr double kRepairShare = 0.01;  // unseen share of a cell's test rays that calls for repair
 
 Cell cell_of(Vec3 p, float spacing) {
   Cell c;
-  for (int a = 0; a < 3; ++a) c[static_cast<size_t>(a)] = static_cast<int32_t>(std::floor(static_cast<double>(p[a]) / spacing));
+  for (int a = 0; a < 3; ++a)
+    c[static_cast<size_t>(a)] = static_cast<int32_t>(std::floor(static_cast<double>(p[a]) / spacing));
   return c;
 }
 
@@ -260,20 +261,24 @@ absl::StatusOr<PlacementResult> place_probes(const RayTracer& tracer, Receivers*
   result.unseen = rays > 0 ? static_cast<double>(unseen) / static_cast<double>(rays) : 0;
   result.repairs = repairs.size();
   result.probes.insert(result.probes.end(), repairs.begin(), repairs.end());
-  std::sort(result.probes.begin(), result.probes.end(), [](const Probe& a, const Probe& b) { return a.key() < b.key(); });
+  std::sort(result.probes.begin(), result.probes.end(),
+            [](const Probe& a, const Probe& b) { return a.key() < b.key(); });
   return result;
 }
 
 float default_spacing(const Aabb& bounds) {
-  const Vec3 s = bounds.size();
-  const double longest = std::max({s.x, s.y, s.z});
+  const Vec3 size = bounds.size();
+  const double longest = std::max({size.x, size.y, size.z});
+  if (!(longest > 0)) return 1;
   // A flat level still has a layer of cells.
-  const double floor = longest / 16;
-  const double volume = std::max<double>(s.x, floor) * std::max<double>(s.y, floor) * std::max<double>(s.z, floor);
-  const double wanted = std::cbrt(volume / 200);
-  if (!(wanted > 0)) return 1;
-  const double unit = std::pow(10.0, std::floor(std::log10(wanted)) - 1);
-  return static_cast<float>(std::round(wanted / unit) * unit);
+  double cells = 1;
+  for (int a = 0; a < 3; ++a) cells *= std::max<double>(size[a], longest / 16);
+  // The least s of two significant digits with s³ ≥ volume ÷ 200. Multiplications only: it is a stored parameter.
+  double unit = 1e-6;
+  while (unit * unit * unit * 1e6 < cells / 200) unit *= 10;
+  int digits = 10;
+  while (digits < 100 && unit * digits * (unit * digits) * (unit * digits) < cells / 200) ++digits;
+  return static_cast<float>(unit * digits);
 }
 
 }  // namespace lightloom

@@ -23,14 +23,14 @@ struct Probe {
 };
 
 struct PlacementOptions {
-  float spacing = 1;      ///< ρ, metres
-  int nearest = 22;       ///< how many probes a receiver can reach: links and fallbacks
+  float spacing = 1;  ///< ρ, metres
+  int nearest = 22;   ///< how many probes a receiver can reach: links and fallbacks
 };
 
 struct PlacementResult {
   std::vector<Probe> probes;  ///< sorted by key
-  double unseen = 0;          ///< share of test rays whose hit, or sky, no base probe in reach sees: what repair starts from
-  size_t repairs = 0;         ///< probes added by repair
+  double unseen = 0;   ///< share of test rays whose hit, or sky, no base probe in reach sees: what repair starts from
+  size_t repairs = 0;  ///< probes added by repair
 };
 /// Base probes are placed for the front sides; back sides that none of them in reach sees are then dropped from
 /// `receivers`: they lie in cavities that no light of the level's open space enters and no camera looks into.

@@ -63,8 +63,7 @@ float utilisation(const LightmapUv& uv, const std::vector<FlatChart>& charts,
 
 }  // namespace
 
-absl::StatusOr<LightmapUv> generate_atlas(const Object& object, const AtlasOptions& options,
-                                          AtlasStats* stats) {
+absl::StatusOr<LightmapUv> generate_atlas(const Object& object, const AtlasOptions& options, AtlasStats* stats) {
   const double texels_per_metre = double{options.texels_per_metre} * object.texel_scale;
   LL_RETURN_IF_ERROR(check_arguments(object, options, texels_per_metre));
   const MeshTopology mesh = build_topology(object);
@@ -73,15 +72,13 @@ absl::StatusOr<LightmapUv> generate_atlas(const Object& object, const AtlasOptio
                                                    options.max_size, " x ", options.max_size,
                                                    " texels; lower the texels per metre or its texel scale"));
   };
-  const double texels =
-      std::accumulate(mesh.area.begin(), mesh.area.end(), 0.0) * texels_per_metre * texels_per_metre;
+  const double texels = std::accumulate(mesh.area.begin(), mesh.area.end(), 0.0) * texels_per_metre * texels_per_metre;
   // Projection shrinks areas by max_angle_cos at most, rounding to whole texels narrows a side by a third at
   // most.
-  if (!(texels * options.max_angle_cos * 4 / 9 <= double{1} * options.max_size * options.max_size))
-    return too_large();
-  LL_ASSIGN_OR_RETURN(const std::vector<FlatChart> charts,
-                      flatten_charts(object, mesh, grow_charts(mesh, options.max_angle_cos), texels_per_metre,
-                                     options.max_size));
+  if (!(texels * options.max_angle_cos * 4 / 9 <= double{1} * options.max_size * options.max_size)) return too_large();
+  LL_ASSIGN_OR_RETURN(
+      const std::vector<FlatChart> charts,
+      flatten_charts(object, mesh, grow_charts(mesh, options.max_angle_cos), texels_per_metre, options.max_size));
 
   std::vector<RectSize> sizes;
   for (const FlatChart& c : charts) sizes.push_back({c.width, c.height});

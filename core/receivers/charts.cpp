@@ -19,8 +19,7 @@ class Grower {
  public:
   explicit Grower(const MeshTopology& mesh) : mesh_(mesh), seen_(mesh.area.size(), 0) {}
 
-  std::vector<uint32_t> grow(uint32_t seed, Vec3 axis, float min_cos, size_t limit,
-                             const std::vector<bool>& taken) {
+  std::vector<uint32_t> grow(uint32_t seed, Vec3 axis, float min_cos, size_t limit, const std::vector<bool>& taken) {
     ++round_;
     std::vector<uint32_t> reached{seed};
     seen_[seed] = round_;
@@ -59,8 +58,7 @@ std::vector<Chart> grow_charts(const MeshTopology& mesh, float max_angle_cos) {
   std::vector<uint32_t> seeds(mesh.area.size());
   std::iota(seeds.begin(), seeds.end(), 0u);
   std::erase_if(seeds, [&](uint32_t t) { return mesh.degenerate(t); });
-  std::stable_sort(seeds.begin(), seeds.end(),
-                   [&](uint32_t a, uint32_t b) { return mesh.area[a] > mesh.area[b]; });
+  std::stable_sort(seeds.begin(), seeds.end(), [&](uint32_t a, uint32_t b) { return mesh.area[a] > mesh.area[b]; });
 
   std::vector<Chart> charts;
   std::vector<bool> taken(mesh.area.size(), false);
@@ -69,8 +67,7 @@ std::vector<Chart> grow_charts(const MeshTopology& mesh, float max_angle_cos) {
     if (taken[seed]) continue;
     // Normals within a cone average to one within it, so the seed stays in its own chart.
     Chart chart;
-    chart.axis =
-        average_normal(mesh, grower.grow(seed, mesh.normal[seed], max_angle_cos, kSurroundings, taken));
+    chart.axis = average_normal(mesh, grower.grow(seed, mesh.normal[seed], max_angle_cos, kSurroundings, taken));
     chart.triangles = grower.grow(seed, chart.axis, max_angle_cos, mesh.area.size(), taken);
     for (uint32_t t : chart.triangles) taken[t] = true;
     charts.push_back(std::move(chart));

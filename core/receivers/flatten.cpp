@@ -177,9 +177,7 @@ std::vector<uint32_t> remove_overlap(FlatChart* chart) {
   constexpr int32_t kHair = kGrid / 64;
 
   std::vector<bool> owned(columns() * rows());
-  const auto sample = [&](int j, int i) {
-    return static_cast<size_t>(j) * columns() + static_cast<size_t>(i);
-  };
+  const auto sample = [&](int j, int i) { return static_cast<size_t>(j) * columns() + static_cast<size_t>(i); };
   std::vector<uint32_t> removed;
   size_t kept = 0;
   for (size_t n = 0; n < chart->triangles.size(); ++n) {
@@ -225,10 +223,9 @@ void crop(FlatChart* chart) {
 /// texel.
 void centre_in_texel(const std::vector<FlatTriangle>& flat, FlatChart* chart) {
   const auto area = [](const FlatTriangle& t) { return std::abs(cross(t[0], t[1], t[2])); };
-  const FlatTriangle largest = *std::max_element(
-      flat.begin(), flat.end(), [&](const auto& a, const auto& b) { return area(a) < area(b); });
-  const Point c{(largest[0].x + largest[1].x + largest[2].x) / 3,
-                (largest[0].y + largest[1].y + largest[2].y) / 3};
+  const FlatTriangle largest =
+      *std::max_element(flat.begin(), flat.end(), [&](const auto& a, const auto& b) { return area(a) < area(b); });
+  const Point c{(largest[0].x + largest[1].x + largest[2].x) / 3, (largest[0].y + largest[1].y + largest[2].y) / 3};
   double rx = 0, ry = 0;
   for (const FlatTriangle& t : flat) {
     for (const Point& p : t) {
@@ -247,10 +244,9 @@ void centre_in_texel(const std::vector<FlatTriangle>& flat, FlatChart* chart) {
 
 /// Moves a chart by less than a texel so that its largest triangle holds a texel centre.
 void shift_onto_centre(FlatChart* chart) {
-  const GridTriangle largest = *std::max_element(chart->corners.begin(), chart->corners.end(),
-                                                 [](const GridTriangle& a, const GridTriangle& b) {
-                                                   return std::abs(twice_area(a)) < std::abs(twice_area(b));
-                                                 });
+  const GridTriangle largest = *std::max_element(
+      chart->corners.begin(), chart->corners.end(),
+      [](const GridTriangle& a, const GridTriangle& b) { return std::abs(twice_area(a)) < std::abs(twice_area(b)); });
   const auto to_centre = [](int32_t sum) { return (kGrid + kGrid / 2 - (sum / 3) % kGrid) % kGrid; };
   const GridPoint shift{to_centre(largest[0].x + largest[1].x + largest[2].x),
                         to_centre(largest[0].y + largest[1].y + largest[2].y)};
@@ -306,9 +302,9 @@ absl::StatusOr<std::vector<FlatChart>> flatten_charts(const Object& object, cons
     std::vector<FlatTriangle> flat = project(object, chart, texels_per_metre);
     const Box box = stand_upright(&flat);
     if (!(std::max(box.width(), box.height()) <= max_size)) {
-      return absl::InvalidArgumentError(absl::StrCat(
-          "object '", object.name, "': a lightmap chart would be ", box.width(), " texels long, over ",
-          max_size, "; lower the texels per metre or the object's texel scale"));
+      return absl::InvalidArgumentError(absl::StrCat("object '", object.name, "': a lightmap chart would be ",
+                                                     box.width(), " texels long, over ", max_size,
+                                                     "; lower the texels per metre or the object's texel scale"));
     }
     if (const std::vector<bool> cut = find_cut(flat, box); !cut.empty()) {
       std::vector<uint32_t> near, far;

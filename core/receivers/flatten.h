@@ -21,7 +21,6 @@ struct FlatChart {
 /// rounds that to whole texels. Charts that fill little of their rectangle are cut, those that overlap
 /// themselves are split: more charts may come out than went in. Error if one is larger than max_size texels.
 absl::StatusOr<std::vector<FlatChart>> flatten_charts(const Object& object, const MeshTopology& mesh,
-                                                      std::vector<Chart> charts, double texels_per_metre,
-                                                      int max_size);
+                                                      std::vector<Chart> charts, double texels_per_metre, int max_size);
 
 }  // namespace lightloom

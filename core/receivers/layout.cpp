@@ -43,8 +43,8 @@ double round_coarsely(double value) {
 
 absl::Status check_arguments(const Scene& scene, const LayoutOptions& options) {
   if (options.lightmap_size < 0 || options.lightmap_size > kMaxSide) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        "lightmap size ", options.lightmap_size, " is out of range; it must be 1 to ", kMaxSide, " texels"));
+    return absl::InvalidArgumentError(absl::StrCat("lightmap size ", options.lightmap_size,
+                                                   " is out of range; it must be 1 to ", kMaxSide, " texels"));
   }
   if (!(options.texels_per_metre >= 0) || !std::isfinite(options.texels_per_metre)) {
     return absl::InvalidArgumentError(
@@ -52,8 +52,8 @@ absl::Status check_arguments(const Scene& scene, const LayoutOptions& options) {
   }
   for (const Object& object : scene.objects) {
     if (receives_lightmap(object) && !(object.texel_scale > 0 && std::isfinite(object.texel_scale))) {
-      return absl::InvalidArgumentError(absl::StrCat("object '", object.name, "': texel scale is ",
-                                                     object.texel_scale, "; it must be positive"));
+      return absl::InvalidArgumentError(
+          absl::StrCat("object '", object.name, "': texel scale is ", object.texel_scale, "; it must be positive"));
     }
     for (const Triangle& t : object.triangles) {
       if (*std::max_element(t.v.begin(), t.v.end()) >= object.positions.size()) {
@@ -96,12 +96,10 @@ absl::StatusOr<std::optional<AtlasLayout>> scene_layout(const Scene& scene, cons
   for (const Object& object : scene.objects) {
     if (receives_lightmap(object) && !(has_unit_uv1(object) && uv1_area(object) > 0)) return std::nullopt;
   }
-  const double wanted =
-      options.lightmap_size > 0 ? options.lightmap_size : scene_atlas_side(scene, texels_per_metre);
+  const double wanted = options.lightmap_size > 0 ? options.lightmap_size : scene_atlas_side(scene, texels_per_metre);
   if (!(wanted <= kMaxSide)) {
-    return absl::InvalidArgumentError(absl::StrCat("the scene's atlas would be ", wanted,
-                                                   " texels wide, over ", kMaxSide,
-                                                   "; lower the texels per metre"));
+    return absl::InvalidArgumentError(absl::StrCat("the scene's atlas would be ", wanted, " texels wide, over ",
+                                                   kMaxSide, "; lower the texels per metre"));
   }
   const int side = static_cast<int>(wanted);
   AtlasLayout layout;
@@ -129,8 +127,7 @@ Vec2 metres_per_uv(const Object& object) {
     const Vec3 q = object.positions[t.v[2]] - object.positions[t.v[0]];
     const float determinant = e.x * f.y - f.x * e.y;
     const double weight = triangle_area(object, t);
-    const double du = length((p * f.y - q * e.y) / determinant),
-                 dv = length((q * e.x - p * f.x) / determinant);
+    const double du = length((p * f.y - q * e.y) / determinant), dv = length((q * e.x - p * f.x) / determinant);
     if (!std::isfinite(weight * du) || !std::isfinite(weight * dv)) continue;
     along_u += weight * du;
     along_v += weight * dv;
@@ -152,8 +149,7 @@ std::optional<LightmapUv> own_uv1(const Object& object, double texels_per_metre)
   const double aspect = double{metres.x} / metres.y;
   const double width = std::ceil(std::sqrt(wanted * aspect)), height = std::ceil(std::sqrt(wanted / aspect));
   if (!(width <= kMaxSide && height <= kMaxSide)) return std::nullopt;
-  LightmapUv uv =
-      scaled_uv1(object, std::max(1, static_cast<int>(width)), std::max(1, static_cast<int>(height)));
+  LightmapUv uv = scaled_uv1(object, std::max(1, static_cast<int>(width)), std::max(1, static_cast<int>(height)));
 
   Vec2 lo = uv.corners[0][0], hi = lo;
   for (const auto& corners : uv.corners) {

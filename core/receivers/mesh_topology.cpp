@@ -30,8 +30,7 @@ Shape shape_of(const Object& object, const Triangle& triangle) {
   s.ny = uz * vx - ux * vz;
   s.nz = ux * vy - uy * vx;
   s.twice_area = std::sqrt(s.nx * s.nx + s.ny * s.ny + s.nz * s.nz);
-  s.longest2 =
-      std::max({ux * ux + uy * uy + uz * uz, vx * vx + vy * vy + vz * vz, wx * wx + wy * wy + wz * wz});
+  s.longest2 = std::max({ux * ux + uy * uy + uz * uz, vx * vx + vy * vy + vz * vz, wx * wx + wy * wy + wz * wz});
   return s;
 }
 

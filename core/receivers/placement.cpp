@@ -71,8 +71,8 @@ absl::StatusOr<PlacedImage> place_objects(const std::vector<RectSize>& sizes, co
   const bool fresh = options.earlier_width <= 0 || options.earlier_height <= 0;
   if (fresh) image.width = image.height = 0;
   const auto too_large = [&] {
-    return absl::InvalidArgumentError(absl::StrCat("lightmaps of all objects do not fit ", max_size, " x ",
-                                                   max_size, " texels; lower the texels per metre"));
+    return absl::InvalidArgumentError(absl::StrCat("lightmaps of all objects do not fit ", max_size, " x ", max_size,
+                                                   " texels; lower the texels per metre"));
   };
   if (image.width > max_size || image.height > max_size) return too_large();
 
@@ -118,15 +118,14 @@ absl::StatusOr<PlacedImage> place_objects(const std::vector<RectSize>& sizes, co
   for (size_t i : waiting) rest.push_back(sizes[i]);
   for (const RectSize& size : rest) {
     if (!fresh && size.width > image.width) {
-      return absl::FailedPreconditionError(
-          absl::StrCat("a new object's lightmap is ", size.width, " texels wide and the earlier image only ",
-                       image.width, "; lower its texel scale or bake without the earlier layout"));
+      return absl::FailedPreconditionError(absl::StrCat("a new object's lightmap is ", size.width,
+                                                        " texels wide and the earlier image only ", image.width,
+                                                        "; lower its texel scale or bake without the earlier layout"));
     }
   }
-  const std::optional<Packing> packing = fresh ? pack_near_square(rest, kGutter, max_size)
-                                         : bottom < max_size
-                                             ? pack_strip(rest, kGutter, image.width, max_size - bottom)
-                                             : std::nullopt;
+  const std::optional<Packing> packing = fresh               ? pack_near_square(rest, kGutter, max_size)
+                                         : bottom < max_size ? pack_strip(rest, kGutter, image.width, max_size - bottom)
+                                                             : std::nullopt;
   if (!packing) return too_large();
   for (size_t k = 0; k < waiting.size(); ++k) {
     image.placements[waiting[k]] = {packing->positions[k].x, bottom + packing->positions[k].y};

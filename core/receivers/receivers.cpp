@@ -12,7 +12,7 @@ namespace {
 
 constexpr uint32_t kProbeRaysSide = 6;  // 36 rays decide; the first 12 do where they agree
 constexpr uint32_t kFirstRays = 12;
-constexpr int kSearchRadius = 8;        // texels
+constexpr int kSearchRadius = 8;  // texels
 
 enum class Space { kOpen, kSolid, kVoid };
 
@@ -78,13 +78,13 @@ uint32_t Receivers::locate(const AtlasLayout& layout, const Hit& hit) const {
         if (const uint32_t r = at(xx, yy); r != kNone) best = r, best_distance = distance;
       }
     }
-    if (best != kNone && best_distance <= (static_cast<float>(radius) + 0.5f) * (static_cast<float>(radius) + 0.5f)) break;
+    if (best != kNone && best_distance <= (static_cast<float>(radius) + 0.5f) * (static_cast<float>(radius) + 0.5f))
+      break;
   }
   return best;
 }
 
-absl::StatusOr<Receivers> find_receivers(const RayTracer& tracer, const AtlasLayout& layout,
-                                         const Parallel& parallel) {
+absl::StatusOr<Receivers> find_receivers(const RayTracer& tracer, const AtlasLayout& layout, const Parallel& parallel) {
   const Scene& scene = tracer.scene();
   Receivers out;
   out.grids.resize(scene.objects.size());

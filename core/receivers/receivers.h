@@ -16,22 +16,22 @@ namespace lightloom {
 struct Receiver {
   uint32_t object = 0;  ///< index into Scene::objects
   uint32_t key = 0;
-  uint32_t texel = 0;   ///< index into the object's TexelGrid::texels
+  uint32_t texel = 0;  ///< index into the object's TexelGrid::texels
   bool back = false;
   ShadingPoint point;
-  uint64_t seed = 0;    ///< of (object id, key): all randomness of this receiver comes from here
+  uint64_t seed = 0;  ///< of (object id, key): all randomness of this receiver comes from here
 };
 
 struct Receivers {
   static constexpr uint32_t kNone = 0xffffffffu;
 
-  std::vector<TexelGrid> grids;     ///< per object
-  std::vector<Receiver> all;        ///< by object, keys ascending within each
+  std::vector<TexelGrid> grids;  ///< per object
+  std::vector<Receiver> all;     ///< by object, keys ascending within each
   struct Range {
     uint32_t begin = 0, end = 0;
   };
-  std::vector<Range> ranges;        ///< per object, its part of `all`
-  uint64_t solid_texels = 0;        ///< front sides dropped as inside solids
+  std::vector<Range> ranges;  ///< per object, its part of `all`
+  uint64_t solid_texels = 0;  ///< front sides dropped as inside solids
 
   /// Drops the receivers that `keep` (one entry per receiver) says false of.
   void retain(const std::vector<bool>& keep);

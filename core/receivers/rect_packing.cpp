@@ -37,8 +37,7 @@ std::optional<Packing> pack_strip(std::span<const RectSize> sizes, int gutter, i
   // The last column and row of gutter may hang over the border.
   std::vector<stbrp_node> nodes(static_cast<size_t>(width + gutter));
   stbrp_context context;
-  stbrp_init_target(&context, width + gutter, max_height + gutter, nodes.data(),
-                    static_cast<int>(nodes.size()));
+  stbrp_init_target(&context, width + gutter, max_height + gutter, nodes.data(), static_cast<int>(nodes.size()));
   if (!stbrp_pack_rects(&context, rects.data(), static_cast<int>(rects.size()))) return std::nullopt;
 
   Packing packing{width, 0, std::vector<RectPosition>(sizes.size())};
@@ -60,8 +59,7 @@ std::optional<Packing> pack_near_square(std::span<const RectSize> sizes, int gut
   if (widest > max_size || side > 2.0 * max_size) return std::nullopt;
 
   // A try costs about rectangles × skyline; a good width matters less the more there are.
-  const int tries =
-      static_cast<int>(std::clamp<int64_t>(200'000 / std::max<int64_t>(1, std::ssize(sizes)), 1, 64));
+  const int tries = static_cast<int>(std::clamp<int64_t>(200'000 / std::max<int64_t>(1, std::ssize(sizes)), 1, 64));
   std::optional<Packing> best;
   // The area, a little more for what is far from square.
   const auto score = [](const Packing& p) {
@@ -71,8 +69,7 @@ std::optional<Packing> pack_near_square(std::span<const RectSize> sizes, int gut
   };
   int previous = 0;
   for (int i = 0; i < tries; ++i) {
-    const int width =
-        std::min(max_size, std::max(widest, static_cast<int>(side * (0.6 + 1.2 * (i + 0.5) / tries))));
+    const int width = std::min(max_size, std::max(widest, static_cast<int>(side * (0.6 + 1.2 * (i + 0.5) / tries))));
     if (width == previous) continue;
     previous = width;
     std::optional<Packing> packing = pack_strip(sizes, gutter, width, max_size);

@@ -9,9 +9,9 @@
 namespace lightloom {
 
 struct ShadingPoint {
-  Vec3 position;    ///< pushed off the surface by RayTracer::offset
-  Vec3 normal;      ///< unit; interpolated vertex normal of the side
-  Vec3 geometric;   ///< unit; by winding, of the side
+  Vec3 position;   ///< pushed off the surface by RayTracer::offset
+  Vec3 normal;     ///< unit; interpolated vertex normal of the side
+  Vec3 geometric;  ///< unit; by winding, of the side
 };
 
 /// The side is the front, or the back if `back`. An interpolated normal that points through the surface is replaced by

@@ -71,15 +71,16 @@ bool barycentric(const std::array<Vec2, 3>& c, Point p, double tolerance, float*
 struct Candidate {
   uint64_t texel;  // y·width + x
   uint32_t triangle;
-  float uv_area;   // texels²
+  float uv_area;  // texels²
   bool centre;
-  float b1, b2;    // of the centre, or of the fragment's centroid
+  float b1, b2;  // of the centre, or of the fragment's centroid
 };
 
 double world_area(const Object& object, uint32_t triangle) {
   const auto& v = object.triangles[triangle].v;
   return length(lightloom::cross(object.positions[v[1]] - object.positions[v[0]],
-                                 object.positions[v[2]] - object.positions[v[0]])) / 2;
+                                 object.positions[v[2]] - object.positions[v[0]])) /
+         2;
 }
 
 /// All texels that a triangle touches, with the clipped area in each.
@@ -91,7 +92,9 @@ void rasterise_triangle(const LightmapUv& uv, uint32_t triangle, std::vector<Can
   const int y0 = std::clamp(static_cast<int>(std::floor(lo_y)), 0, uv.height - 1);
   const int x1 = std::clamp(static_cast<int>(std::floor(hi_x)), 0, uv.width - 1);
   const int y1 = std::clamp(static_cast<int>(std::floor(hi_y)), 0, uv.height - 1);
-  const auto key = [&](int x, int y) { return static_cast<uint64_t>(y) * static_cast<uint64_t>(uv.width) + static_cast<uint64_t>(x); };
+  const auto key = [&](int x, int y) {
+    return static_cast<uint64_t>(y) * static_cast<uint64_t>(uv.width) + static_cast<uint64_t>(x);
+  };
 
   Polygon whole;
   whole.n = 3;
@@ -119,8 +122,8 @@ void rasterise_triangle(const LightmapUv& uv, uint32_t triangle, std::vector<Can
 
 Vec3 geometric_normal(const Object& object, uint32_t triangle) {
   const auto& v = object.triangles[triangle].v;
-  return normalize(cross(object.positions[v[1]] - object.positions[v[0]],
-                         object.positions[v[2]] - object.positions[v[0]]));
+  return normalize(
+      cross(object.positions[v[1]] - object.positions[v[0]], object.positions[v[2]] - object.positions[v[0]]));
 }
 
 TexelGrid rasterise(const Object& object, const LightmapUv& uv) {
@@ -173,7 +176,8 @@ TexelGrid rasterise(const Object& object, const LightmapUv& uv) {
       kept |= keep[j];
       const Candidate& c = candidates[j];
       // The centre's triangle, else the largest fragment's.
-      if (!point || (c.centre && !point->centre) || (c.centre == point->centre && !c.centre && c.uv_area > point->uv_area)) {
+      if (!point || (c.centre && !point->centre) ||
+          (c.centre == point->centre && !c.centre && c.uv_area > point->uv_area)) {
         point = &c;
       }
     }
@@ -248,8 +252,8 @@ SurfacePoint sample_texel(const Object& object, const LightmapUv& uv, const Texe
       const uint32_t t = grid.fragments[texel.first_fragment + f].triangle;
       SurfacePoint s{t, 0, 0};
       if (!barycentric(uv.corners[t], p, 0, &s.b1, &s.b2)) continue;
-      if (t != texel.triangle && (dot(geometric_normal(object, t), normal) < 0.7071f ||
-                                  length(position(object, s) - centre) > reach)) {
+      if (t != texel.triangle &&
+          (dot(geometric_normal(object, t), normal) < 0.7071f || length(position(object, s) - centre) > reach)) {
         continue;
       }
       return s;

@@ -22,9 +22,9 @@ struct Fragment {
 struct Texel {
   uint32_t x = 0, y = 0;
   uint32_t triangle = 0;
-  float b1 = 0, b2 = 0;         ///< of the point in `triangle`
+  float b1 = 0, b2 = 0;  ///< of the point in `triangle`
   bool centre_covered = false;
-  float area = 0;               ///< m² of surface inside the texel
+  float area = 0;                              ///< m² of surface inside the texel
   uint32_t first_fragment = 0, fragments = 0;  ///< range of TexelGrid::fragments
 };
 

@@ -18,8 +18,7 @@ constexpr uint32_t kShared = 0xffffffffu;
 bool has_unit_uv1(const Object& object) {
   if (object.uv1.empty() || object.uv1.size() != object.positions.size()) return false;
   const auto inside = [](float c) { return c >= -kRounding && c <= 1 + kRounding; };
-  return std::all_of(object.uv1.begin(), object.uv1.end(),
-                     [&](Vec2 p) { return inside(p.x) && inside(p.y); });
+  return std::all_of(object.uv1.begin(), object.uv1.end(), [&](Vec2 p) { return inside(p.x) && inside(p.y); });
 }
 
 LightmapUv scaled_uv1(const Object& object, int width, int height) {
@@ -38,8 +37,7 @@ double uv1_area(const Object& object) {
   double area = 0;
   for (const Triangle& t : object.triangles) {
     const Vec2 a = object.uv1[t.v[0]], b = object.uv1[t.v[1]], c = object.uv1[t.v[2]];
-    area +=
-        0.5 * std::abs((double{b.x} - a.x) * (double{c.y} - a.y) - (double{b.y} - a.y) * (double{c.x} - a.x));
+    area += 0.5 * std::abs((double{b.x} - a.x) * (double{c.y} - a.y) - (double{b.y} - a.y) * (double{c.x} - a.x));
   }
   return area;
 }
@@ -69,8 +67,7 @@ void TexelClaims::paint(const std::array<Vec2, 3>& corners, uint32_t owner) {
   rasterise(triangle, {}, 0, [&](int y, int first, int last) {
     painted_ += static_cast<uint64_t>(last - first + 1);
     for (int x = first; x <= last; ++x) {
-      uint32_t& claimed =
-          owner_[static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x)];
+      uint32_t& claimed = owner_[static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x)];
       if (claimed == 0) {
         claimed = owner;
         ++covered_;

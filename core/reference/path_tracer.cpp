@@ -7,7 +7,6 @@
 #include <functional>
 #include <vector>
 
-
 namespace lightloom {
 namespace {
 
@@ -113,8 +112,8 @@ absl::StatusOr<ReferenceResult> reference_lightmap(const RayTracer& tracer, cons
       const SurfacePoint s = sample_texel(object, layout.uv[items[i].object], grid, texel, jitter, options.footprint);
       return shading_point(object, s.triangle, s.b1, s.b2, false);
     };
-    const uint64_t key = hash_combine(hash_combine(object.id.low64(), static_cast<uint64_t>(texel.y) << 32 | texel.x),
-                                      options.seed);
+    const uint64_t key =
+        hash_combine(hash_combine(object.id.low64(), static_cast<uint64_t>(texel.y) << 32 | texel.x), options.seed);
     Rng first(hash_combine(key, 1)), second(hash_combine(key, 2));
     halves.first[i] = irradiance(tracer, point, options.bounces, options.samples / 2, &first);
     halves.second[i] = irradiance(tracer, point, options.bounces, options.samples / 2, &second);
@@ -145,9 +144,11 @@ absl::StatusOr<ReferenceResult> reference_camera(const RayTracer& tracer, const 
   Halves halves(pixels);
   std::vector<float> valid(pixels, 0);
   const bool done = parallel_for(pixels, options.parallel, [&](uint64_t i) {
-    const int x = static_cast<int>(i % static_cast<uint64_t>(width)), y = static_cast<int>(i / static_cast<uint64_t>(width));
-    const Hit hit = tracer.closest(camera.position, camera_direction(camera, (static_cast<float>(x) + 0.5f) / static_cast<float>(width),
-                                                                     (static_cast<float>(y) + 0.5f) / static_cast<float>(height)));
+    const int x = static_cast<int>(i % static_cast<uint64_t>(width)),
+              y = static_cast<int>(i / static_cast<uint64_t>(width));
+    const Hit hit = tracer.closest(camera.position,
+                                   camera_direction(camera, (static_cast<float>(x) + 0.5f) / static_cast<float>(width),
+                                                    (static_cast<float>(y) + 0.5f) / static_cast<float>(height)));
     if (!hit) return;
     valid[i] = 1;
     const ShadingPoint s = shading_point(scene.objects[hit.object], hit.triangle, hit.b1, hit.b2, hit.back);
@@ -161,7 +162,8 @@ absl::StatusOr<ReferenceResult> reference_camera(const RayTracer& tracer, const 
   ReferenceResult result;
   result.image = Image(width, height, {"R", "G", "B", "A"});
   for (size_t i = 0; i < pixels; ++i) {
-    const int x = static_cast<int>(i % static_cast<size_t>(width)), y = static_cast<int>(i / static_cast<size_t>(width));
+    const int x = static_cast<int>(i % static_cast<size_t>(width)),
+              y = static_cast<int>(i / static_cast<size_t>(width));
     result.image.set_rgb(x, y, (halves.first[i] + halves.second[i]) * 0.5f);
     (*result.image.channel("A"))[i] = valid[i];
   }
@@ -171,7 +173,8 @@ absl::StatusOr<ReferenceResult> reference_camera(const RayTracer& tracer, const 
 
 Vec3 camera_direction(const Camera& camera, float x, float y) {
   const float half = std::tan(camera.yfov / 2);
-  return normalize(camera.forward + camera.right * ((2 * x - 1) * half * camera.aspect) + camera.up * ((1 - 2 * y) * half));
+  return normalize(camera.forward + camera.right * ((2 * x - 1) * half * camera.aspect) +
+                   camera.up * ((1 - 2 * y) * half));
 }
 
 }  // namespace lightloom

@@ -39,8 +39,9 @@ absl::StatusOr<Image> render_view(const RayTracer& tracer, const SurfaceElements
       Vec3 sum;
       for (uint32_t s = 0; s < side * side; ++s) {
         const Sample2 jitter = stratified(s, side, &rng);
-        const Vec3 direction = camera_direction(camera, (static_cast<float>(x) + jitter.u) / static_cast<float>(options.width),
-                                                (static_cast<float>(row) + jitter.v) / static_cast<float>(height));
+        const Vec3 direction =
+            camera_direction(camera, (static_cast<float>(x) + jitter.u) / static_cast<float>(options.width),
+                             (static_cast<float>(row) + jitter.v) / static_cast<float>(height));
         const Hit hit = tracer.closest(camera.position, direction);
         sum += hit ? shade(tracer, elements, irradiance, hit, options.layer) : tracer.scene().environment;
       }

@@ -46,7 +46,8 @@ absl::StatusOr<SurfaceElements> load_surface_elements(const std::filesystem::pat
     if (it == scene_object.end()) return stale("object '" + entry.name + "' is missing");
     const uint32_t o = it->second;
     const LightmapUv& uv = out.layout.uv[o];
-    if (uv.width != entry.width || uv.height != entry.height) return stale("the lightmap of '" + entry.name + "' differs");
+    if (uv.width != entry.width || uv.height != entry.height)
+      return stale("the lightmap of '" + entry.name + "' differs");
     // The asset's placement is in force: an incremental bake keeps old places.
     out.layout.placements[o] = {entry.x, entry.y};
     receivers.ranges[o].begin = static_cast<uint32_t>(receivers.all.size());
@@ -92,8 +93,8 @@ absl::StatusOr<SurfaceInputs> light_surfaces(const RayTracer& tracer, const Surf
     Rng rng(hash_combine(r.seed, 0xd12ec7));
     const float weight = 1.0f / static_cast<float>(side * side);
     for (uint32_t s = 0; s < side * side; ++s) {
-      const SurfacePoint p = sample_texel(object, elements.layout.uv[r.object], grid, grid.texels[r.texel],
-                                          stratified(s, side, &rng));
+      const SurfacePoint p =
+          sample_texel(object, elements.layout.uv[r.object], grid, grid.texels[r.texel], stratified(s, side, &rng));
       const Triangle& t = object.triangles[p.triangle];
       out.direct[i] += direct_irradiance(tracer, shading_point(object, p.triangle, p.b1, p.b2, r.back)) * weight;
       out.albedo[i] += albedo_at(scene, object, t, p.b1, p.b2) * weight;

@@ -14,8 +14,8 @@ namespace lightloom {
 /// The surface elements of an asset, found again in the scene it was baked from. Element i is receivers.all[i]: objects
 /// in the manifest's order, keys ascending.
 struct SurfaceElements {
-  AtlasLayout layout;             ///< per scene object
-  Receivers receivers;            ///< Receiver::object indexes Scene::objects
+  AtlasLayout layout;   ///< per scene object
+  Receivers receivers;  ///< Receiver::object indexes Scene::objects
 };
 
 /// Fails if the scene is not the one that was baked (then bake again), or the asset cannot be read.
@@ -24,7 +24,7 @@ absl::StatusOr<SurfaceElements> load_surface_elements(const std::filesystem::pat
 
 /// Arrays of one value per surface element, linear RGB.
 struct SurfaceInputs {
-  std::vector<Vec3> direct;    ///< irradiance straight from punctual lights, W/m²
+  std::vector<Vec3> direct;  ///< irradiance straight from punctual lights, W/m²
   std::vector<Vec3> albedo;
   std::vector<Vec3> emission;  ///< radiance
 };

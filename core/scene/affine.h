@@ -70,8 +70,7 @@ inline Vec3 unit(Dvec3 v) {
   const double square = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
   if (!(square > 0) || !std::isfinite(square)) return {};
   const double length = std::abs(square - 1) < 3e-7 ? 1 : std::sqrt(square);
-  return {static_cast<float>(v[0] / length), static_cast<float>(v[1] / length),
-          static_cast<float>(v[2] / length)};
+  return {static_cast<float>(v[0] / length), static_cast<float>(v[1] / length), static_cast<float>(v[2] / length)};
 }
 
 }  // namespace lightloom

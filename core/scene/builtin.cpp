@@ -34,8 +34,7 @@ absl::StatusOr<Scene> builtin_scene(std::string_view name) {
     if (name == e.name) return e.make();
     known += (known.empty() ? "" : ", ") + std::string(e.name);
   }
-  return absl::NotFoundError("there is no built-in scene \"" + std::string(name) + "\"; choose from " +
-                             known);
+  return absl::NotFoundError("there is no built-in scene \"" + std::string(name) + "\"; choose from " + known);
 }
 
 }  // namespace lightloom

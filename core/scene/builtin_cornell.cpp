@@ -33,10 +33,8 @@ Scene make_cornell() {
   add_quad(s.object("back"), {5.496f, 0, d}, {0, 0, d}, {0, h, d}, {5.56f, h, d}, white);
   add_quad(s.object("right"), {0, 0, d}, {0, 0, 0}, {0, h, 0}, {0, h, d}, green);
   add_quad(s.object("left"), {5.528f, 0, 0}, {5.496f, 0, d}, {5.56f, h, d}, {5.56f, h, 0}, red);
-  add_block(s.object("short box"), {{{1.30f, 0.65f}, {0.82f, 2.25f}, {2.40f, 2.72f}, {2.90f, 1.14f}}}, 1.65f,
-            white);
-  add_block(s.object("tall box"), {{{4.23f, 2.47f}, {2.65f, 2.96f}, {3.14f, 4.56f}, {4.72f, 4.06f}}}, 3.30f,
-            white);
+  add_block(s.object("short box"), {{{1.30f, 0.65f}, {0.82f, 2.25f}, {2.40f, 2.72f}, {2.90f, 1.14f}}}, 1.65f, white);
+  add_block(s.object("tall box"), {{{4.23f, 2.47f}, {2.65f, 2.96f}, {3.14f, 4.56f}, {4.72f, 4.06f}}}, 3.30f, white);
 
   s.point_light("key", {2.78f, 4, 2.795f}, {1, 1, 1}, 20);
   s.camera("front", {2.78f, 2.73f, -8}, {2.78f, 2.73f, 0}, 0.6858f, 1);

@@ -27,8 +27,7 @@ void add_table(Object* o, Vec3 lo, Vec3 hi, float leg, uint32_t top, uint32_t le
 void add_shelf(Object* o, Vec3 lo, Vec3 hi, bool along_z, int shelves, uint32_t material) {
   const float t = 0.03f, sink = 0.01f;
   const auto box = [&](float u0, float u1, float w0, float w1, float y0, float y1) {
-    along_z ? add_box(o, {w0, y0, u0}, {w1, y1, u1}, material)
-            : add_box(o, {u0, y0, w0}, {u1, y1, w1}, material);
+    along_z ? add_box(o, {w0, y0, u0}, {w1, y1, u1}, material) : add_box(o, {u0, y0, w0}, {u1, y1, w1}, material);
   };
   const float u0 = along_z ? lo.z : lo.x, u1 = along_z ? hi.z : hi.x;  // width
   const float w0 = along_z ? lo.x : lo.z, w1 = along_z ? hi.x : hi.z;  // depth
@@ -48,14 +47,13 @@ void add_shell(SceneBuilder* s, const Palette& m) {
   add_wall(s->object("wall south"), {-0.11f, y0, -0.1f}, {9.11f, y1, 0}, 2,
            {{1.2f, 3, 0.9f, 2.2f}, {6.4f, 7.8f, 0.9f, 2.2f}}, m.plaster, m.plaster);
   add_wall(s->object("wall north"), {-0.11f, y0, 7}, {9.11f, y1, 7.1f}, 2, {}, m.plaster, m.plaster);
-  add_wall(s->object("wall west"), {-0.1f, y0, -0.05f}, {0, y1, 7.05f}, 0, {{5, 6.2f, 1.1f, 2.1f}}, m.plaster,
-           m.red);
+  add_wall(s->object("wall west"), {-0.1f, y0, -0.05f}, {0, y1, 7.05f}, 0, {{5, 6.2f, 1.1f, 2.1f}}, m.plaster, m.red);
   add_wall(s->object("wall east"), {9, y0, -0.05f}, {9.1f, y1, 7.05f}, 0, {{2.6f, 4.4f, 0.8f, 2.2f}}, m.blue,
            m.plaster);
-  add_wall(s->object("wall bedroom"), {5.35f, y0, -0.05f}, {5.45f, y1, 7.05f}, 0, {{1.2f, 2.1f, y0, door}},
-           m.plaster, m.blue);
-  add_wall(s->object("wall kitchen"), {-0.05f, y0, 3.95f}, {5.4f, y1, 4.05f}, 2, {{0.8f, 1.7f, y0, door}},
-           m.plaster, m.yellow);
+  add_wall(s->object("wall bedroom"), {5.35f, y0, -0.05f}, {5.45f, y1, 7.05f}, 0, {{1.2f, 2.1f, y0, door}}, m.plaster,
+           m.blue);
+  add_wall(s->object("wall kitchen"), {-0.05f, y0, 3.95f}, {5.4f, y1, 4.05f}, 2, {{0.8f, 1.7f, y0, door}}, m.plaster,
+           m.yellow);
   add_wall(s->object("wall store"), {3.35f, y0, 4}, {3.45f, y1, 7.05f}, 0, {}, m.yellow, m.plaster);
 }
 

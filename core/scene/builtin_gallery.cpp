@@ -52,23 +52,21 @@ void add_coffered_slab(Object* o, Vec3 lo, Vec3 hi, float recess, int n, uint32_
       }
     }
     const float a = u(i), b = u(i + 1);  // the outer sides, cut like the underside
-    add_quad(o, {lo.x + b, lo.y, lo.z}, {lo.x + a, lo.y, lo.z}, {lo.x + a, hi.y, lo.z},
-             {lo.x + b, hi.y, lo.z}, material);
-    add_quad(o, {lo.x, lo.y, lo.z + a}, {lo.x, lo.y, lo.z + b}, {lo.x, hi.y, lo.z + b},
-             {lo.x, hi.y, lo.z + a}, material);
+    add_quad(o, {lo.x + b, lo.y, lo.z}, {lo.x + a, lo.y, lo.z}, {lo.x + a, hi.y, lo.z}, {lo.x + b, hi.y, lo.z},
+             material);
+    add_quad(o, {lo.x, lo.y, lo.z + a}, {lo.x, lo.y, lo.z + b}, {lo.x, hi.y, lo.z + b}, {lo.x, hi.y, lo.z + a},
+             material);
     const float xe = x(last), ze = z(last);
-    add_quad(o, {lo.x + a, lo.y, ze}, {lo.x + b, lo.y, ze}, {lo.x + b, hi.y, ze}, {lo.x + a, hi.y, ze},
-             material);
-    add_quad(o, {xe, lo.y, lo.z + b}, {xe, lo.y, lo.z + a}, {xe, hi.y, lo.z + a}, {xe, hi.y, lo.z + b},
-             material);
+    add_quad(o, {lo.x + a, lo.y, ze}, {lo.x + b, lo.y, ze}, {lo.x + b, hi.y, ze}, {lo.x + a, hi.y, ze}, material);
+    add_quad(o, {xe, lo.y, lo.z + b}, {xe, lo.y, lo.z + a}, {xe, hi.y, lo.z + a}, {xe, hi.y, lo.z + b}, material);
   }
 }
 
 /// A fluted column, from the floor into the ceiling.
 void add_column(Object* o, Vec3 foot, uint32_t material) {
   add_box(o, {foot.x - 0.36f, kFoot, foot.z - 0.36f}, {foot.x + 0.36f, 0.14f, foot.z + 0.36f}, material);
-  add_box(o, {foot.x - 0.34f, kHeight - 0.12f, foot.z - 0.34f},
-          {foot.x + 0.34f, kHeight + 0.02f, foot.z + 0.34f}, material);
+  add_box(o, {foot.x - 0.34f, kHeight - 0.12f, foot.z - 0.34f}, {foot.x + 0.34f, kHeight + 0.02f, foot.z + 0.34f},
+          material);
   Lathe lathe;
   lathe.center = foot;
   lathe.flutes = 16;
@@ -108,8 +106,7 @@ void add_vase(Object* o, Vec3 foot, uint32_t material) {
     lathe.profile.push_back({0.14f + t * (1 - t) * (1.6f - 1.5f * t) * 0.75f + 0.05f * t * t * t, 0.9f * t});
   }
   const float rim = lathe.profile.back().radius;
-  lathe.profile.insert(lathe.profile.end(),
-                       {{rim - 0.03f, 0.9f}, {rim - 0.03f, 0.9f}, {0.09f, 0.6f}, {0, 0.55f}});
+  lathe.profile.insert(lathe.profile.end(), {{rim - 0.03f, 0.9f}, {rim - 0.03f, 0.9f}, {0.09f, 0.6f}, {0, 0.55f}});
   add_lathe(o, lathe, material);
 }
 
@@ -135,8 +132,8 @@ void add_picture(SceneBuilder* s, int x, int z, float offset, const Palette& m) 
   const std::string side = offset < 0 ? " west" : " east";
   Object* frame = s->object(at("frame", x, z) + side);
   const float w = 0.9f, y0 = 1.3f, y1 = 2.6f, t = 0.08f, front = wall - 0.06f, back = wall + 0.02f;
-  add_wall(frame, {cx - w, y0, front}, {cx + w, y1, back}, 2, {{cx - w + t, cx + w - t, y0 + t, y1 - t}},
-           m.wood, m.wood);
+  add_wall(frame, {cx - w, y0, front}, {cx + w, y1, back}, 2, {{cx - w + t, cx + w - t, y0 + t, y1 - t}}, m.wood,
+           m.wood);
   const uint32_t hue = m.hues[static_cast<size_t>(x + 2 * z + (offset < 0 ? 1 : 0)) % 4];
   add_box(s->object(at("picture", x, z) + side), {cx - w + 0.02f, y0 + 0.02f, wall - 0.02f},
           {cx + w - 0.02f, y1 - 0.02f, wall + 0.01f}, hue);
@@ -200,15 +197,11 @@ Scene make_gallery() {
       }
       const Vec3 foot{middle(x), 1, middle(z)};
       Object* pedestal = s.object(at("pedestal", x, z));
-      add_box(pedestal, {foot.x - 0.4f, kFoot, foot.z - 0.4f}, {foot.x + 0.4f, 0.12f, foot.z + 0.4f},
-              m.marble);
-      add_box(pedestal, {foot.x - 0.32f, 0.1f, foot.z - 0.32f}, {foot.x + 0.32f, 0.95f, foot.z + 0.32f},
-              m.marble);
-      add_box(pedestal, {foot.x - 0.38f, 0.93f, foot.z - 0.38f}, {foot.x + 0.38f, 1, foot.z + 0.38f},
-              m.marble);
+      add_box(pedestal, {foot.x - 0.4f, kFoot, foot.z - 0.4f}, {foot.x + 0.4f, 0.12f, foot.z + 0.4f}, m.marble);
+      add_box(pedestal, {foot.x - 0.32f, 0.1f, foot.z - 0.32f}, {foot.x + 0.32f, 0.95f, foot.z + 0.32f}, m.marble);
+      add_box(pedestal, {foot.x - 0.38f, 0.93f, foot.z - 0.38f}, {foot.x + 0.38f, 1, foot.z + 0.38f}, m.marble);
       const int kind = (x + z) % 4;
-      add_sculpture(s.object(at("sculpture", x, z)), kind, foot,
-                    kind % 2 ? m.bronze : m.hues[static_cast<size_t>(x)]);
+      add_sculpture(s.object(at("sculpture", x, z)), kind, foot, kind % 2 ? m.bronze : m.hues[static_cast<size_t>(x)]);
       add_picture(&s, x, z, -2.6f, m);
       add_picture(&s, x, z, 2.6f, m);
       if ((x + z) % 2 == 0) {
@@ -226,8 +219,7 @@ Scene make_gallery() {
   spot.inner_cone_angle = 0.25f;
   spot.outer_cone_angle = 0.4f;
   s.light(spot);
-  s.camera("hall", {middle(1) - 3.6f, 1.7f, middle(1) - 3.2f}, {middle(1) + 2, 1.4f, middle(1) + 2}, 1.1f,
-           16.0f / 9);
+  s.camera("hall", {middle(1) - 3.6f, 1.7f, middle(1) - 3.2f}, {middle(1) + 2, 1.4f, middle(1) + 2}, 1.1f, 16.0f / 9);
   s.camera("enfilade", {0.8f, 1.7f, middle(1)}, {line(kColumns), 1.5f, middle(1)}, 0.9f, 16.0f / 9);
   return s.finish();
 }

@@ -38,8 +38,7 @@ Maze carve() {
     std::vector<std::array<int, 2>> next;
     for (const auto& [dx, dz] : {std::array{1, 0}, std::array{-1, 0}, std::array{0, 1}, std::array{0, -1}}) {
       const int nx = x + dx, nz = z + dz;
-      if (nx >= 0 && nz >= 0 && nx < kCells && nz < kCells && !cell(visited, nx, nz))
-        next.push_back({nx, nz});
+      if (nx >= 0 && nz >= 0 && nx < kCells && nz < kCells && !cell(visited, nx, nz)) next.push_back({nx, nz});
     }
     if (next.empty()) {
       path.pop_back();
@@ -83,8 +82,8 @@ Scene make_maze() {
   }
   const auto wall = [&](bool along_x, int x, int z) {
     const uint32_t m = walls[static_cast<size_t>(x / 3 + z / 3) % 3];
-    Object* o = s.object(std::string("wall ") + (along_x ? "x" : "z") + " " + std::to_string(x) + "," +
-                         std::to_string(z));
+    Object* o =
+        s.object(std::string("wall ") + (along_x ? "x" : "z") + " " + std::to_string(x) + "," + std::to_string(z));
     const Vec3 lo{line(x), -0.05f, line(z)}, hi{line(x), kHeight + 0.05f, line(z)};
     if (along_x) {
       add_box(o, {lo.x, lo.y, lo.z - kHalfWall}, {hi.x + kPitch, hi.y, hi.z + kHalfWall}, m);
@@ -105,8 +104,7 @@ Scene make_maze() {
   s.point_light("red", {center(0), 1.9f, center(0)}, {1, 0.45f, 0.3f}, 15);
   s.point_light("green", {center(4), 1.9f, center(4)}, {0.45f, 1, 0.5f}, 15);
   s.point_light("blue", {center(8), 1.9f, center(6)}, {0.4f, 0.55f, 1}, 15);
-  s.camera("middle", {center(4) - 0.8f, 1.6f, center(4) - 0.8f}, {center(4) + 1, 1.2f, center(4) + 1}, 1.1f,
-           16.0f / 9);
+  s.camera("middle", {center(4) - 0.8f, 1.6f, center(4) - 0.8f}, {center(4) + 1, 1.2f, center(4) + 1}, 1.1f, 16.0f / 9);
   return s.finish();
 }
 

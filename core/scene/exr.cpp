@@ -25,8 +25,7 @@ absl::Status cannot_write(const fs::path& path, const std::string& why) {
 
 absl::Status write_exr(const Image& image, const fs::path& path) {
   const auto pixels = static_cast<size_t>(image.width) * static_cast<size_t>(image.height);
-  if (image.width <= 0 || image.height <= 0 || image.channels.empty())
-    return cannot_write(path, "the image is empty");
+  if (image.width <= 0 || image.height <= 0 || image.channels.empty()) return cannot_write(path, "the image is empty");
   std::error_code code;
   if (path.has_parent_path()) fs::create_directories(path.parent_path(), code);
   if (code) return cannot_write(path, code.message());
@@ -41,8 +40,8 @@ absl::Status write_exr(const Image& image, const fs::path& path) {
       header.channels().insert(c.name, Imf::Channel(Imf::FLOAT));
       // OpenEXR's slices are not const, but writing only reads them.
       auto* base = reinterpret_cast<char*>(const_cast<float*>(c.values.data()));
-      frame.insert(c.name, Imf::Slice(Imf::FLOAT, base, sizeof(float),
-                                      sizeof(float) * static_cast<size_t>(image.width)));
+      frame.insert(c.name,
+                   Imf::Slice(Imf::FLOAT, base, sizeof(float), sizeof(float) * static_cast<size_t>(image.width)));
     }
     Imf::OutputFile file(temporary.c_str(), header);
     file.setFrameBuffer(frame);
@@ -64,8 +63,7 @@ absl::StatusOr<Image> read_exr(const fs::path& path) {
   try {
     Imf::InputFile file(path.c_str());
     const Imath::Box2i window = file.header().dataWindow();
-    const int64_t width = int64_t{window.max.x} - window.min.x + 1,
-                  height = int64_t{window.max.y} - window.min.y + 1;
+    const int64_t width = int64_t{window.max.x} - window.min.x + 1, height = int64_t{window.max.y} - window.min.y + 1;
     int64_t count = 0;
     for (auto c = file.header().channels().begin(); c != file.header().channels().end(); ++c) {
       if (c.channel().xSampling != 1 || c.channel().ySampling != 1) {

@@ -28,11 +28,9 @@ absl::StatusOr<Elements> elements(const tinygltf::Model& model, int view, int64_
                    std::to_string(element_size) + " bytes; export the file again");
   }
   const uint64_t needed = count == 0 ? 0 : (count - 1) * stride + element_size;
-  if (offset < 0 || static_cast<uint64_t>(offset) > range.size ||
-      needed > range.size - static_cast<uint64_t>(offset)) {
+  if (offset < 0 || static_cast<uint64_t>(offset) > range.size || needed > range.size - static_cast<uint64_t>(offset)) {
     return invalid(whose + ": " + std::to_string(count) + " elements reach past the end of " +
-                   named("buffer view", view) + " (" + std::to_string(range.size) +
-                   " bytes); export the file again");
+                   named("buffer view", view) + " (" + std::to_string(range.size) + " bytes); export the file again");
   }
   return Elements{range.data + offset, stride};
 }
@@ -93,21 +91,18 @@ bool is_index_type(int type) {
 }
 
 uint64_t size_of(int component_type) {
-  return static_cast<uint64_t>(
-      std::max(0, tinygltf::GetComponentSizeInBytes(static_cast<uint32_t>(component_type))));
+  return static_cast<uint64_t>(std::max(0, tinygltf::GetComponentSizeInBytes(static_cast<uint32_t>(component_type))));
 }
 
 /// Calls set(i, pointer to the element) for the dense elements, then for those that the sparse part replaces.
 template <class Set>
-absl::Status for_each_element(const tinygltf::Model& model, int index, uint64_t element_size,
-                              const Set& set) {
+absl::Status for_each_element(const tinygltf::Model& model, int index, uint64_t element_size, const Set& set) {
   const tinygltf::Accessor& a = model.accessors[static_cast<size_t>(index)];
   const std::string whose = named("accessor", index);
   if (a.bufferView >= 0) {
     if (a.byteOffset > uint64_t{1} << 40) return invalid(whose + ": its byte offset is past its buffer");
-    LL_ASSIGN_OR_RETURN(
-        const Elements dense,
-        elements(model, a.bufferView, static_cast<int64_t>(a.byteOffset), a.count, element_size, whose));
+    LL_ASSIGN_OR_RETURN(const Elements dense, elements(model, a.bufferView, static_cast<int64_t>(a.byteOffset), a.count,
+                                                       element_size, whose));
     for (uint64_t i = 0; i < a.count; ++i) set(i, dense.data + i * dense.stride);
   }
   if (!a.sparse.isSparse) return absl::OkStatus();
@@ -116,19 +111,16 @@ absl::Status for_each_element(const tinygltf::Model& model, int index, uint64_t 
   if (s.count < 0 || static_cast<uint64_t>(s.count) > a.count) {
     return invalid(whose + ": its sparse part has more elements than it has; export the file again");
   }
-  if (!is_index_type(s.indices.componentType))
-    return invalid(whose + ": its sparse indices are not unsigned integers");
+  if (!is_index_type(s.indices.componentType)) return invalid(whose + ": its sparse indices are not unsigned integers");
   const auto count = static_cast<uint64_t>(s.count);
-  LL_ASSIGN_OR_RETURN(const Elements where,
-                      elements(model, s.indices.bufferView, s.indices.byteOffset, count,
-                               size_of(s.indices.componentType), whose + " (sparse indices)"));
+  LL_ASSIGN_OR_RETURN(const Elements where, elements(model, s.indices.bufferView, s.indices.byteOffset, count,
+                                                     size_of(s.indices.componentType), whose + " (sparse indices)"));
   LL_ASSIGN_OR_RETURN(const Elements values, elements(model, s.values.bufferView, s.values.byteOffset, count,
                                                       element_size, whose + " (sparse values)"));
   for (uint64_t i = 0; i < count; ++i) {
     const uint32_t target = index_component(where.data + i * where.stride, s.indices.componentType);
     if (target >= a.count) {
-      return invalid(whose + ": sparse index " + std::to_string(target) +
-                     " is out of range; export the file again");
+      return invalid(whose + ": sparse index " + std::to_string(target) + " is out of range; export the file again");
     }
     set(target, values.data + i * values.stride);
   }
@@ -143,13 +135,12 @@ absl::StatusOr<ByteRange> buffer_view_bytes(const tinygltf::Model& model, int in
   }
   const tinygltf::BufferView& view = model.bufferViews[static_cast<size_t>(index)];
   if (view.buffer < 0 || static_cast<size_t>(view.buffer) >= model.buffers.size()) {
-    return invalid(named("buffer view", index) + " uses " + named("buffer", view.buffer) +
-                   ", which does not exist");
+    return invalid(named("buffer view", index) + " uses " + named("buffer", view.buffer) + ", which does not exist");
   }
   const std::vector<unsigned char>& buffer = model.buffers[static_cast<size_t>(view.buffer)].data;
   if (view.byteOffset > buffer.size() || view.byteLength > buffer.size() - view.byteOffset) {
-    return invalid(named("buffer view", index) + " reaches past the end of " + named("buffer", view.buffer) +
-                   " (" + std::to_string(buffer.size()) + " bytes); export the file again");
+    return invalid(named("buffer view", index) + " reaches past the end of " + named("buffer", view.buffer) + " (" +
+                   std::to_string(buffer.size()) + " bytes); export the file again");
   }
   return ByteRange{buffer.data() + view.byteOffset, view.byteLength, view.byteStride};
 }
@@ -160,8 +151,8 @@ absl::StatusOr<uint64_t> accessor_count(const tinygltf::Model& model, int index)
   }
   const uint64_t count = model.accessors[static_cast<size_t>(index)].count;
   if (count > kMaxElements) {
-    return invalid(named("accessor", index) + " has " + std::to_string(count) +
-                   " elements, more than the limit of " + std::to_string(kMaxElements) + "; split the mesh");
+    return invalid(named("accessor", index) + " has " + std::to_string(count) + " elements, more than the limit of " +
+                   std::to_string(kMaxElements) + "; split the mesh");
   }
   return count;
 }
@@ -178,8 +169,7 @@ absl::StatusOr<std::vector<float>> read_floats(const tinygltf::Model& model, int
   // The dense elements are known to lie in a buffer before room for them is made.
   const auto set = [&](uint64_t i, const uint8_t* p) {
     if (out.empty()) out.resize(count * width);
-    for (uint64_t c = 0; c < width; ++c)
-      out[i * width + c] = component(p + c * size, a.componentType, a.normalized);
+    for (uint64_t c = 0; c < width; ++c) out[i * width + c] = component(p + c * size, a.componentType, a.normalized);
   };
   LL_RETURN_IF_ERROR(for_each_element(model, index, size * width, set));
   out.resize(count * width);

@@ -27,8 +27,8 @@ constexpr size_t kMaxJsonDepth = 64;
 constexpr size_t kMaxJsonObjects = 2'000'000;
 constexpr size_t kMaxJsonValues = 8'000'000;
 
-constexpr std::array<std::string_view, 4> kKnownExtensions{
-    "KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_mesh_quantization", "KHR_materials_unlit"};
+constexpr std::array<std::string_view, 4> kKnownExtensions{"KHR_lights_punctual", "KHR_materials_emissive_strength",
+                                                           "KHR_mesh_quantization", "KHR_materials_unlit"};
 
 /// The files that a level links to. tinygltf asks for them by callbacks.
 struct Folder {
@@ -38,8 +38,7 @@ struct Folder {
 };
 
 bool stays_inside(std::string_view uri) {
-  if (uri.empty() || uri.front() == '/' || uri.find('\\') != uri.npos || uri.find('\0') != uri.npos)
-    return false;
+  if (uri.empty() || uri.front() == '/' || uri.find('\\') != uri.npos || uri.find('\0') != uri.npos) return false;
   if (uri.substr(0, uri.find('/')).find(':') != uri.npos) return false;  // a scheme
   for (const fs::path& part : fs::path(uri)) {
     if (part == "..") return false;
@@ -59,8 +58,7 @@ bool file_exists(const std::string& uri, void* user) {
 
 std::string expand_path(const std::string& uri, void*) { return uri; }
 
-bool read_linked_file(std::vector<unsigned char>* out, std::string* error, const std::string& uri,
-                      void* user) {
+bool read_linked_file(std::vector<unsigned char>* out, std::string* error, const std::string& uri, void* user) {
   auto& folder = *static_cast<Folder*>(user);
   if (!file_exists(uri, user)) return false;
   std::error_code code;
@@ -80,8 +78,8 @@ bool read_linked_file(std::vector<unsigned char>* out, std::string* error, const
 }
 
 /// tinygltf passes images of buffer views without checking their bounds: they are left for later.
-bool keep_encoded(tinygltf::Image* image, const int, std::string*, std::string*, int, int,
-                  const unsigned char* bytes, int size, void*) {
+bool keep_encoded(tinygltf::Image* image, const int, std::string*, std::string*, int, int, const unsigned char* bytes,
+                  int size, void*) {
   image->as_is = true;
   if (image->bufferView < 0 && size > 0) image->image.assign(bytes, bytes + size);
   return true;
@@ -103,15 +101,13 @@ absl::StatusOr<std::string_view> json_chunk(const std::vector<uint8_t>& data) {
   if (u32_at(data, 4) != 2) return broken("it is of version " + std::to_string(u32_at(data, 4)) + ", not 2");
   const uint64_t length = u32_at(data, 8), json_length = u32_at(data, 12);
   if (length > data.size()) {
-    return broken("it says it has " + std::to_string(length) + " bytes but has " +
-                  std::to_string(data.size()));
+    return broken("it says it has " + std::to_string(length) + " bytes but has " + std::to_string(data.size()));
   }
   if (u32_at(data, 16) != 0x4e4f534a) return broken("its first chunk is not JSON");
   if (20 + json_length > length) return broken("its JSON chunk runs past the end");
   if (20 + json_length < length) {
     if (28 + json_length > length) return broken("it ends within its second chunk's header");
-    if (28 + json_length + u32_at(data, 20 + json_length) > length)
-      return broken("its BIN chunk runs past the end");
+    if (28 + json_length + u32_at(data, 20 + json_length) > length) return broken("its BIN chunk runs past the end");
   }
   return std::string_view(reinterpret_cast<const char*>(&data[20]), json_length);
 }
@@ -156,8 +152,7 @@ absl::Status check_json(const nlohmann::json& root, bool binary) {
     for (size_t i = 0; i < buffers->size(); ++i) {
       const auto& buffer = (*buffers)[i];
       if (!buffer.is_object() || buffer.contains("uri") || (binary && i == 0)) continue;
-      return absl::InvalidArgumentError("buffer " + std::to_string(i) +
-                                        " has no uri; only a .glb's first may lack it");
+      return absl::InvalidArgumentError("buffer " + std::to_string(i) + " has no uri; only a .glb's first may lack it");
     }
   }
   return absl::OkStatus();
@@ -214,9 +209,8 @@ absl::StatusOr<std::unique_ptr<tinygltf::Model>> read_gltf_model(const fs::path&
     return absl::InvalidArgumentError("is not readable as glTF: " + one_line(e.what()) + "; export it again");
   }
   if (!folder.refused.empty()) {
-    return absl::InvalidArgumentError(
-        "links to " + shown(folder.refused) +
-        ", which is not in the file's folder; copy it there and link to it by its name");
+    return absl::InvalidArgumentError("links to " + shown(folder.refused) +
+                                      ", which is not in the file's folder; copy it there and link to it by its name");
   }
   if (!ok || !error.empty()) {
     return absl::InvalidArgumentError("is not readable as glTF: " + one_line(error) + "; export it again");

@@ -24,8 +24,7 @@ absl::Status invalid(std::string message) { return absl::InvalidArgumentError(st
 /// A node's own transform: its matrix, or T·R·S (glTF 2.0, 3.5.3).
 absl::StatusOr<Transform> local_transform(const tinygltf::Node& node, const std::string& whose) {
   const auto sized = [](const std::vector<double>& v, size_t n) { return v.empty() || v.size() == n; };
-  if (!sized(node.matrix, 16) || !sized(node.translation, 3) || !sized(node.rotation, 4) ||
-      !sized(node.scale, 3)) {
+  if (!sized(node.matrix, 16) || !sized(node.translation, 3) || !sized(node.rotation, 4) || !sized(node.scale, 3)) {
     return invalid(whose + ": its transform has the wrong number of values; export the file again");
   }
   Transform m = kIdentity;
@@ -36,8 +35,7 @@ absl::StatusOr<Transform> local_transform(const tinygltf::Node& node, const std:
   if (!node.rotation.empty()) {
     const auto& q = node.rotation;
     const double square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
-    if (!(square > 1e-12))
-      return invalid(whose + ": its rotation is not a unit quaternion; export the file again");
+    if (!(square > 1e-12)) return invalid(whose + ": its rotation is not a unit quaternion; export the file again");
     const double s = 2 / square, x = q[0], y = q[1], z = q[2], w = q[3];
     m = {1 - s * (y * y + z * z),
          s * (x * y + z * w),
@@ -91,14 +89,12 @@ class Loader {
     if (!model_.scenes.empty()) {
       const int scene = model_.defaultScene < 0 ? 0 : model_.defaultScene;
       if (static_cast<size_t>(scene) >= model_.scenes.size()) {
-        return invalid("its default scene " + std::to_string(scene) +
-                       " does not exist; export the file again");
+        return invalid("its default scene " + std::to_string(scene) + " does not exist; export the file again");
       }
       return model_.scenes[static_cast<size_t>(scene)].nodes;
     }
     std::set<int> children;
-    for (const tinygltf::Node& node : model_.nodes)
-      children.insert(node.children.begin(), node.children.end());
+    for (const tinygltf::Node& node : model_.nodes) children.insert(node.children.begin(), node.children.end());
     std::vector<int> roots;
     for (int i = 0; i < static_cast<int>(model_.nodes.size()); ++i) {
       if (!children.count(i)) roots.push_back(i);
@@ -123,8 +119,7 @@ class Loader {
       const auto i = static_cast<size_t>(index);
       const tinygltf::Node& node = model_.nodes[i];
       const std::string whose = "node " + std::to_string(index) + " " + shown(node.name);
-      if (visited[i])
-        return invalid(whose + " is reached twice: nodes must form trees; export the file again");
+      if (visited[i]) return invalid(whose + " is reached twice: nodes must form trees; export the file again");
       visited[i] = true;
 
       LL_ASSIGN_OR_RETURN(const Transform local, local_transform(node, whose));
@@ -147,13 +142,11 @@ class Loader {
       if (static_cast<unsigned char>(c) < 32 || c == 127) c = '?';
     }
     std::string name = base;
-    for (uint64_t& n = copies_[base]; !names_.insert(name).second;)
-      name = base + " #" + std::to_string(++n + 1);
+    for (uint64_t& n = copies_[base]; !names_.insert(name).second;) name = base + " #" + std::to_string(++n + 1);
     return name;
   }
 
-  absl::Status add_object(const tinygltf::Node& node, int index, const std::string& whose,
-                          const Transform& world) {
+  absl::Status add_object(const tinygltf::Node& node, int index, const std::string& whose, const Transform& world) {
     Object object;
     object.name = object_name(node.name, index);
     object.transform = world;
@@ -218,12 +211,10 @@ class Loader {
     out.up = cross(out.right, out.forward);
     out.yfov = static_cast<float>(in.perspective.yfov);
     if (in.perspective.aspectRatio > 0) out.aspect = static_cast<float>(in.perspective.aspectRatio);
-    if (!(out.yfov > 0 && out.yfov < std::numbers::pi_v<float>) || !std::isfinite(out.aspect) ||
-        !(out.aspect > 0)) {
+    if (!(out.yfov > 0 && out.yfov < std::numbers::pi_v<float>) || !std::isfinite(out.aspect) || !(out.aspect > 0)) {
       return invalid(whose + ": its camera's yfov must lie in (0, pi) and its aspect ratio above 0");
     }
-    if (out.right == Vec3{})
-      return invalid(whose + ": a camera cannot be scaled to nothing; reset its scale");
+    if (out.right == Vec3{}) return invalid(whose + ": a camera cannot be scaled to nothing; reset its scale");
     scene_->cameras.push_back(out);
     return absl::OkStatus();
   }
@@ -246,18 +237,15 @@ class Loader {
     } else if (in.type == "directional") {
       out.type = LightType::kDirectional;
     } else {
-      return invalid(whose + ": light type " + shown(in.type) +
-                     " is unknown; use point, spot or directional");
+      return invalid(whose + ": light type " + shown(in.type) + " is unknown; use point, spot or directional");
     }
     out.name = !node.name.empty() ? node.name : in.name;
     out.position = origin(world);
     if (out.type != LightType::kPoint) {
       out.direction = axis(world, 2, -1);
-      if (out.direction == Vec3{})
-        return invalid(whose + ": a light cannot be scaled to nothing; reset its scale");
+      if (out.direction == Vec3{}) return invalid(whose + ": a light cannot be scaled to nothing; reset its scale");
     }
-    if (!in.color.empty() && in.color.size() != 3)
-      return invalid(whose + ": its light's color must have 3 numbers");
+    if (!in.color.empty() && in.color.size() != 3) return invalid(whose + ": its light's color must have 3 numbers");
     for (int c = 0; c < 3 && !in.color.empty(); ++c)
       out.color[c] = static_cast<float>(in.color[static_cast<size_t>(c)]);
     out.intensity = static_cast<float>(in.intensity);
@@ -269,9 +257,8 @@ class Loader {
         return invalid(whose + ": its light's color, intensity and range must be finite and not negative");
       }
     }
-    if (out.type == LightType::kSpot &&
-        !(out.inner_cone_angle >= 0 && out.inner_cone_angle <= out.outer_cone_angle &&
-          out.outer_cone_angle > 0 && out.outer_cone_angle <= 1.5708f)) {
+    if (out.type == LightType::kSpot && !(out.inner_cone_angle >= 0 && out.inner_cone_angle <= out.outer_cone_angle &&
+                                          out.outer_cone_angle > 0 && out.outer_cone_angle <= 1.5708f)) {
       return invalid(whose + ": its light's cone angles must be 0 <= inner <= outer <= pi/2");
     }
     scene_->lights.push_back(std::move(out));

@@ -32,8 +32,7 @@ absl::StatusOr<ByteRange> image_bytes(const tinygltf::Model& model, const tinygl
                                       const std::string& whose) {
   if (image.bufferView >= 0) return buffer_view_bytes(model, image.bufferView);
   if (image.image.empty()) {
-    return invalid(whose + ": image " + shown(image.uri) +
-                   " is missing or empty; put it beside the glTF file");
+    return invalid(whose + ": image " + shown(image.uri) + " is missing or empty; put it beside the glTF file");
   }
   return ByteRange{image.image.data(), image.image.size(), 0};
 }
@@ -108,8 +107,8 @@ class TextureReader {
   uint64_t bytes_ = 0;
 };
 
-absl::Status read_texture(const tinygltf::TextureInfo& info, const std::string& whose,
-                          TextureReader* textures, GltfWarnings* warnings, int* texture, int* uv) {
+absl::Status read_texture(const tinygltf::TextureInfo& info, const std::string& whose, TextureReader* textures,
+                          GltfWarnings* warnings, int* texture, int* uv) {
   if (info.index == -1) return absl::OkStatus();
   if (info.texCoord != 0 && info.texCoord != 1) {
     return invalid(whose + " uses TEXCOORD_" + std::to_string(info.texCoord) + "; only 0 and 1 are read");
@@ -131,8 +130,8 @@ absl::StatusOr<double> emissive_strength(const tinygltf::Material& in, const std
   return strength;
 }
 
-absl::StatusOr<Material> read_material(const tinygltf::Material& in, const std::string& whose,
-                                       TextureReader* textures, GltfWarnings* warnings) {
+absl::StatusOr<Material> read_material(const tinygltf::Material& in, const std::string& whose, TextureReader* textures,
+                                       GltfWarnings* warnings) {
   Material out;
   out.name = in.name;
   const auto& pbr = in.pbrMetallicRoughness;
@@ -141,8 +140,8 @@ absl::StatusOr<Material> read_material(const tinygltf::Material& in, const std::
   const auto fraction = [](double v) { return static_cast<float>(std::clamp(v, 0.0, 1.0)); };
   out.base_color = {fraction(color[0]), fraction(color[1]), fraction(color[2])};
   out.alpha = fraction(color[3]);
-  LL_RETURN_IF_ERROR(read_texture(pbr.baseColorTexture, whose, textures, warnings, &out.base_color_texture,
-                                  &out.base_color_uv));
+  LL_RETURN_IF_ERROR(
+      read_texture(pbr.baseColorTexture, whose, textures, warnings, &out.base_color_texture, &out.base_color_uv));
 
   LL_ASSIGN_OR_RETURN(const double strength, emissive_strength(in, whose));
   if (!in.emissiveFactor.empty()) {

@@ -17,8 +17,7 @@ namespace lightloom {
 /// Geometry in the node's space. Normals are zero where the file has no usable one.
 struct MeshReader::Local : Object {
   bool has_uv0 = false, has_uv1 = false, lacks_uv1 = false;
-  std::map<std::map<std::string, int>, uint32_t>
-      bases;  // attributes → first vertex, for primitives that share them
+  std::map<std::map<std::string, int>, uint32_t> bases;  // attributes → first vertex, for primitives that share them
 };
 
 namespace {
@@ -29,9 +28,9 @@ constexpr double kFarthest = 1e9;  // metres; beyond it float has no use
 absl::Status invalid(std::string message) { return absl::InvalidArgumentError(std::move(message)); }
 
 /// Values of an optional attribute, one per vertex, or empty if the primitive has none.
-absl::StatusOr<std::vector<float>> attribute(const tinygltf::Model& model,
-                                             const tinygltf::Primitive& primitive, const char* name,
-                                             int components, uint64_t vertices, const std::string& whose) {
+absl::StatusOr<std::vector<float>> attribute(const tinygltf::Model& model, const tinygltf::Primitive& primitive,
+                                             const char* name, int components, uint64_t vertices,
+                                             const std::string& whose) {
   const auto it = primitive.attributes.find(name);
   if (it == primitive.attributes.end()) return std::vector<float>{};
   LL_ASSIGN_OR_RETURN(const uint64_t count, accessor_count(model, it->second));
@@ -93,8 +92,7 @@ enum class Defect { kNone, kNotFinite, kNoArea };
 
 Defect defect(const std::array<Vec3, 3>& p) {
   for (const Vec3 v : p) {
-    if (!is_finite(v) || std::abs(v.x) > kFarthest || std::abs(v.y) > kFarthest ||
-        std::abs(v.z) > kFarthest) {
+    if (!is_finite(v) || std::abs(v.x) > kFarthest || std::abs(v.y) > kFarthest || std::abs(v.z) > kFarthest) {
       return Defect::kNotFinite;
     }
   }
@@ -135,14 +133,12 @@ uint32_t MeshReader::default_material() {
   return static_cast<uint32_t>(default_material_);
 }
 
-absl::Status MeshReader::append_vertices(const tinygltf::Primitive& primitive, uint64_t count,
-                                         const std::string& whose, const std::string& object, Local* local) {
+absl::Status MeshReader::append_vertices(const tinygltf::Primitive& primitive, uint64_t count, const std::string& whose,
+                                         const std::string& object, Local* local) {
   LL_ASSIGN_OR_RETURN(const std::vector<float> p, attribute(model_, primitive, "POSITION", 3, count, whose));
   LL_ASSIGN_OR_RETURN(const std::vector<float> n, attribute(model_, primitive, "NORMAL", 3, count, whose));
-  LL_ASSIGN_OR_RETURN(const std::vector<float> uv0,
-                      attribute(model_, primitive, "TEXCOORD_0", 2, count, whose));
-  LL_ASSIGN_OR_RETURN(const std::vector<float> uv1,
-                      attribute(model_, primitive, "TEXCOORD_1", 2, count, whose));
+  LL_ASSIGN_OR_RETURN(const std::vector<float> uv0, attribute(model_, primitive, "TEXCOORD_0", 2, count, whose));
+  LL_ASSIGN_OR_RETURN(const std::vector<float> uv1, attribute(model_, primitive, "TEXCOORD_1", 2, count, whose));
   const auto base = static_cast<std::ptrdiff_t>(local->positions.size());
   for (uint64_t i = 0; i < count; ++i) local->positions.push_back({p[3 * i], p[3 * i + 1], p[3 * i + 2]});
   append(n, count, &local->normals);
@@ -155,8 +151,7 @@ absl::Status MeshReader::append_vertices(const tinygltf::Primitive& primitive, u
     warnings_->add("primitives had no normals and got flat ones", object);
     return absl::OkStatus();
   }
-  const auto bad =
-      static_cast<uint64_t>(std::count(local->normals.begin() + base, local->normals.end(), Vec3{}));
+  const auto bad = static_cast<uint64_t>(std::count(local->normals.begin() + base, local->normals.end(), Vec3{}));
   if (bad > 0) warnings_->add("normals were zero or not finite and became those of a face", object, bad);
   return absl::OkStatus();
 }
@@ -191,8 +186,7 @@ absl::Status MeshReader::append_primitive(int mesh, size_t index, const std::str
   triangles_ += primitive.mode == TINYGLTF_MODE_TRIANGLES ? corner_count / 3 : corner_count;
   if (vertices_ > kMaxElements || triangles_ > kMaxTriangles) {
     return absl::ResourceExhaustedError(whose + ": the level has more than " + std::to_string(kMaxTriangles) +
-                                        " triangles or " + std::to_string(kMaxElements) +
-                                        " vertices; split it");
+                                        " triangles or " + std::to_string(kMaxElements) + " vertices; split it");
   }
 
   std::vector<uint32_t> indices;
@@ -203,8 +197,8 @@ absl::Status MeshReader::append_primitive(int mesh, size_t index, const std::str
   }
   for (const uint32_t i : indices) {
     if (i < vertices) continue;
-    return invalid(whose + ": index " + std::to_string(i) + " is out of range, it has " +
-                   std::to_string(vertices) + " vertices; export the file again");
+    return invalid(whose + ": index " + std::to_string(i) + " is out of range, it has " + std::to_string(vertices) +
+                   " vertices; export the file again");
   }
   LL_ASSIGN_OR_RETURN(auto triples, corners(indices, primitive.mode, whose));
   if (triples.empty()) return absl::OkStatus();
@@ -214,8 +208,7 @@ absl::Status MeshReader::append_primitive(int mesh, size_t index, const std::str
   const uint32_t base = shared->second;
   if (is_new) LL_RETURN_IF_ERROR(append_vertices(primitive, vertices, whose, object, local));
 
-  const uint32_t material =
-      primitive.material >= 0 ? static_cast<uint32_t>(primitive.material) : default_material();
+  const uint32_t material = primitive.material >= 0 ? static_cast<uint32_t>(primitive.material) : default_material();
   const auto duplicate = [&](uint32_t v) {  // a corner of its own, so that its normal can be the face's
     local->positions.push_back(local->positions[v]);
     local->normals.push_back({});
@@ -234,8 +227,7 @@ absl::Status MeshReader::append_primitive(int mesh, size_t index, const std::str
 
 absl::Status MeshReader::read(int mesh, Object* object) {
   if (mesh < 0 || static_cast<size_t>(mesh) >= model_.meshes.size()) {
-    return invalid("node " + shown(object->name) + " uses mesh " + std::to_string(mesh) +
-                   ", which does not exist");
+    return invalid("node " + shown(object->name) + " uses mesh " + std::to_string(mesh) + ", which does not exist");
   }
   Local local;
   for (size_t i = 0; i < model_.meshes[static_cast<size_t>(mesh)].primitives.size(); ++i) {
@@ -261,8 +253,7 @@ absl::Status MeshReader::read(int mesh, Object* object) {
     no_area += d == Defect::kNoArea;
     return d != Defect::kNone;
   });
-  if (not_finite)
-    warnings_->add("triangles with vertices that are not finite were left out", object->name, not_finite);
+  if (not_finite) warnings_->add("triangles with vertices that are not finite were left out", object->name, not_finite);
   if (no_area) warnings_->add("triangles without area were left out", object->name, no_area);
 
   // Vertices that no triangle uses go.

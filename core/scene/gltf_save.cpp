@@ -53,8 +53,7 @@ class Writer {
     std::string json = root_.dump();
     json.resize((json.size() + 3) / 4 * 4, ' ');
     const uint64_t total = 12 + 8 + json.size() + (bin_.empty() ? 0 : 8 + bin_.size());
-    if (total > 0xffffffffu)
-      return absl::InvalidArgumentError("is larger than the 4 GiB of a .glb; split the level");
+    if (total > 0xffffffffu) return absl::InvalidArgumentError("is larger than the 4 GiB of a .glb; split the level");
     std::vector<uint8_t> out;
     out.reserve(total);
     const auto u32 = [&](uint64_t v) {
@@ -175,8 +174,7 @@ class Writer {
         indices.insert(indices.end(), {v[0], v[mirrored ? 2 : 1], v[mirrored ? 1 : 2]});
       }
       const size_t accessor = add_accessor(indices, "SCALAR", 5125, kElementArrayBuffer);
-      mesh["primitives"].push_back(
-          {{"attributes", attributes}, {"indices", accessor}, {"material", material}});
+      mesh["primitives"].push_back({{"attributes", attributes}, {"indices", accessor}, {"material", material}});
     }
     root_["meshes"].push_back(mesh);
     node["mesh"] = root_["meshes"].size() - 1;
@@ -197,8 +195,7 @@ class Writer {
     }
     for (Vec3& n : *normals) {  // the inverse of M⁻ᵀ is Mᵀ
       Dvec3 l{};
-      for (size_t c = 0; c < 3; ++c)
-        l[c] = world[4 * c] * n.x + world[4 * c + 1] * n.y + world[4 * c + 2] * n.z;
+      for (size_t c = 0; c < 3; ++c) l[c] = world[4 * c] * n.x + world[4 * c + 1] * n.y + world[4 * c + 2] * n.z;
       n = unit(l);
     }
   }
@@ -227,10 +224,9 @@ class Writer {
   }
 
   void add_camera(const Camera& c) {
-    root_["cameras"].push_back(
-        {{"type", "perspective"},
-         {"name", c.name},
-         {"perspective", {{"yfov", c.yfov}, {"aspectRatio", c.aspect}, {"znear", 0.05}}}});
+    root_["cameras"].push_back({{"type", "perspective"},
+                                {"name", c.name},
+                                {"perspective", {{"yfov", c.yfov}, {"aspectRatio", c.aspect}, {"znear", 0.05}}}});
     root_["nodes"].push_back({{"name", c.name},
                               {"camera", root_["cameras"].size() - 1},
                               {"matrix", matrix(c.right, c.up, -c.forward, c.position)}});
@@ -245,8 +241,7 @@ class Writer {
 
 absl::Status save_gltf(const Scene& scene, const std::filesystem::path& path) {
   const auto cannot = [&](const absl::Status& status) {
-    return absl::Status(status.code(),
-                        "cannot write " + path.string() + ": " + std::string(status.message()));
+    return absl::Status(status.code(), "cannot write " + path.string() + ": " + std::string(status.message()));
   };
   Writer writer(scene);
   if (absl::Status status = writer.build(); !status.ok()) return cannot(status);

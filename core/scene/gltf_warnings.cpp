@@ -8,8 +8,7 @@ std::string shown(std::string_view name) {
   constexpr size_t kLongest = 64;
   std::string text(name.substr(0, kLongest));
   if (name.size() > kLongest) {
-    while (!text.empty() && (static_cast<unsigned char>(text.back()) & 0xc0) == 0x80)
-      text.pop_back();  // whole UTF-8
+    while (!text.empty() && (static_cast<unsigned char>(text.back()) & 0xc0) == 0x80) text.pop_back();  // whole UTF-8
     if (!text.empty() && (static_cast<unsigned char>(text.back()) & 0x80)) text.pop_back();
     text += "…";
   }

@@ -55,8 +55,7 @@ void Image::set_rgb(int x, int y, Vec3 value) {
 absl::Status write_png(const Image& image, const std::filesystem::path& path) {
   const auto *r = image.channel("R"), *g = image.channel("G"), *b = image.channel("B");
   if (image.width <= 0 || image.height <= 0 || !r || !g || !b) {
-    return absl::InvalidArgumentError("cannot write " + path.string() +
-                                      ": a PNG needs pixels and channels R, G, B");
+    return absl::InvalidArgumentError("cannot write " + path.string() + ": a PNG needs pixels and channels R, G, B");
   }
   std::vector<uint8_t> pixels;
   pixels.reserve(r->size() * 3);
@@ -70,8 +69,7 @@ absl::Status write_png(const Image& image, const std::filesystem::path& path) {
                                                     bytes + size);
   };
   if (!stbi_write_png_to_func(append, &png, image.width, image.height, 3, pixels.data(), image.width * 3)) {
-    return absl::ResourceExhaustedError("cannot write " + path.string() +
-                                        ": not enough memory to encode the PNG");
+    return absl::ResourceExhaustedError("cannot write " + path.string() + ": not enough memory to encode the PNG");
   }
   return write_file_atomic(path, png);
 }

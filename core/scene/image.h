@@ -23,12 +23,14 @@ struct Image {
   /// All values 0.
   Image(int width, int height, const std::vector<std::string>& names);
 
-  size_t index(int x, int y) const { return static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x); }
+  size_t index(int x, int y) const {
+    return static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x);
+  }
   /// nullptr if there is no such channel.
   const std::vector<float>* channel(const std::string& name) const;
   std::vector<float>* channel(const std::string& name);
 
-  Vec3 rgb(int x, int y) const;          ///< channels R, G, B. REQUIRES: present
+  Vec3 rgb(int x, int y) const;  ///< channels R, G, B. REQUIRES: present
   void set_rgb(int x, int y, Vec3 value);
 };
 

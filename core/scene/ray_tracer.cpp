@@ -37,8 +37,7 @@ void filter_closest(const RTCFilterFunctionNArguments* args) {
   const float t = RTCRayN_tfar(args->ray, args->N, 0);
   const uint64_t key = static_cast<uint64_t>(g.content_rank) << 32 | primitive;
   const bool loses_tie = t == query->t && key > query->key;
-  if (loses_tie ||
-      !passes_mask(g, primitive, RTCHitN_u(args->hit, args->N, 0), RTCHitN_v(args->hit, args->N, 0))) {
+  if (loses_tie || !passes_mask(g, primitive, RTCHitN_u(args->hit, args->N, 0), RTCHitN_v(args->hit, args->N, 0))) {
     args->valid[0] = 0;
     return;
   }
@@ -73,9 +72,7 @@ void recompute(Vec3 o, Vec3 d, Vec3 p0, Vec3 p1, Vec3 p2, Hit* hit) {
   const auto sub = [](Vec3 a, Vec3 b) {
     return D3{static_cast<double>(a.x) - b.x, static_cast<double>(a.y) - b.y, static_cast<double>(a.z) - b.z};
   };
-  const auto cr = [](D3 a, D3 b) {
-    return D3{a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-  };
+  const auto cr = [](D3 a, D3 b) { return D3{a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; };
   const auto dt = [](D3 a, D3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; };
   const D3 e1 = sub(p1, p0), e2 = sub(p2, p0), s = sub(o, p0), dir{d.x, d.y, d.z};
   const D3 h = cr(dir, e2), q = cr(s, e1);
@@ -109,7 +106,8 @@ RayTracer::~RayTracer() = default;
 
 absl::StatusOr<std::unique_ptr<RayTracer>> RayTracer::create(const Scene& scene) {
   if (!__builtin_cpu_supports("avx2")) {
-    return absl::FailedPreconditionError("this CPU lacks AVX2, which baked bytes are pinned to; use an x86-64-v3 machine");
+    return absl::FailedPreconditionError(
+        "this CPU lacks AVX2, which baked bytes are pinned to; use an x86-64-v3 machine");
   }
   auto impl = std::make_unique<Impl>();
   impl->scene = &scene;
@@ -140,11 +138,10 @@ absl::StatusOr<std::unique_ptr<RayTracer>> RayTracer::create(const Scene& scene)
       if (scene.materials[t.material].alpha_mode == AlphaMode::kMask) context.has_mask = true;
     }
     RTCGeometry geometry = rtcNewGeometry(impl->device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    auto* vertices = static_cast<Vec3*>(rtcSetNewGeometryBuffer(
-        geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vec3), object.positions.size()));
-    auto* indices = static_cast<uint32_t*>(
-        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(uint32_t),
-                                object.triangles.size()));
+    auto* vertices = static_cast<Vec3*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                                                sizeof(Vec3), object.positions.size()));
+    auto* indices = static_cast<uint32_t*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                                                   3 * sizeof(uint32_t), object.triangles.size()));
     if (!vertices || !indices) {
       rtcReleaseGeometry(geometry);
       return absl::ResourceExhaustedError("out of memory for the ray tracer's copy of object '" + object.name + "'");
@@ -205,12 +202,10 @@ Vec3 RayTracer::position(const Hit& hit) const {
 Vec3 RayTracer::geometric_normal(const Hit& hit) const {
   const Object& object = impl_->scene->objects[hit.object];
   const auto& v = object.triangles[hit.triangle].v;
-  return normalize(cross(object.positions[v[1]] - object.positions[v[0]],
-                         object.positions[v[2]] - object.positions[v[0]]));
+  return normalize(
+      cross(object.positions[v[1]] - object.positions[v[0]], object.positions[v[2]] - object.positions[v[0]]));
 }
 
-float RayTracer::offset(Vec3 p) {
-  return 1e-5f + 2e-5f * std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)});
-}
+float RayTracer::offset(Vec3 p) { return 1e-5f + 2e-5f * std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}); }
 
 }  // namespace lightloom

@@ -16,11 +16,11 @@
 namespace lightloom {
 
 struct Hit {
-  uint32_t object = kNone;    ///< index into Scene::objects
-  uint32_t triangle = 0;      ///< index into Object::triangles
+  uint32_t object = kNone;  ///< index into Scene::objects
+  uint32_t triangle = 0;    ///< index into Object::triangles
   float t = std::numeric_limits<float>::infinity();
-  float b1 = 0, b2 = 0;       ///< barycentric weights of the second and third vertex
-  bool back = false;          ///< the ray came from behind (dot(direction, geometric normal) > 0)
+  float b1 = 0, b2 = 0;  ///< barycentric weights of the second and third vertex
+  bool back = false;     ///< the ray came from behind (dot(direction, geometric normal) > 0)
 
   static constexpr uint32_t kNone = 0xffffffffu;
   explicit operator bool() const { return object != kNone; }

@@ -53,10 +53,9 @@ absl::StatusOr<Vec3> color(const Json& value, const std::string& where) {
 }
 
 absl::StatusOr<Light> read_light(const Json& in, const std::string& where) {
-  LL_RETURN_IF_ERROR(check_keys(in,
-                                {"type", "name", "position", "direction", "color", "intensity", "range",
-                                 "innerConeAngle", "outerConeAngle"},
-                                where));
+  LL_RETURN_IF_ERROR(check_keys(
+      in, {"type", "name", "position", "direction", "color", "intensity", "range", "innerConeAngle", "outerConeAngle"},
+      where));
   Light out;
   const std::string type = in.contains("type") && in["type"].is_string() ? in["type"].get<std::string>() : "";
   if (type == "point") {
@@ -75,16 +74,14 @@ absl::StatusOr<Light> read_light(const Json& in, const std::string& where) {
   if (out.type != LightType::kDirectional && !in.contains("position")) {
     return invalid(where + ".position is missing");
   }
-  if (out.type != LightType::kPoint && !in.contains("direction"))
-    return invalid(where + ".direction is missing");
+  if (out.type != LightType::kPoint && !in.contains("direction")) return invalid(where + ".direction is missing");
   if (in.contains("position")) {
     LL_ASSIGN_OR_RETURN(out.position, vector(in["position"], where + ".position"));
   }
   if (in.contains("direction")) {
     LL_ASSIGN_OR_RETURN(const Vec3 d, vector(in["direction"], where + ".direction"));
     out.direction = normalize(d);
-    if (!(std::abs(length(out.direction) - 1) < 1e-3f))
-      return invalid(where + ".direction must have a direction");
+    if (!(std::abs(length(out.direction) - 1) < 1e-3f)) return invalid(where + ".direction must have a direction");
   }
   if (in.contains("color")) {
     LL_ASSIGN_OR_RETURN(out.color, color(in["color"], where + ".color"));
@@ -98,8 +95,8 @@ absl::StatusOr<Light> read_light(const Json& in, const std::string& where) {
     LL_ASSIGN_OR_RETURN(*value, number(in[key], where + "." + key));
     if (*value < 0) return invalid(where + "." + key + " must not be negative");
   }
-  if (out.type == LightType::kSpot && !(out.inner_cone_angle <= out.outer_cone_angle &&
-                                        out.outer_cone_angle > 0 && out.outer_cone_angle <= 1.5708f)) {
+  if (out.type == LightType::kSpot &&
+      !(out.inner_cone_angle <= out.outer_cone_angle && out.outer_cone_angle > 0 && out.outer_cone_angle <= 1.5708f)) {
     return invalid(where + ": its cone angles must be 0 <= innerConeAngle <= outerConeAngle <= pi/2");
   }
   return out;
@@ -122,8 +119,7 @@ absl::StatusOr<Rig> read_rig(const Json& in, std::string where) {
     }
   }
   if (in.contains("emissive")) {
-    if (!in["emissive"].is_object())
-      return invalid(where + ".emissive must be an object of material: [r, g, b]");
+    if (!in["emissive"].is_object()) return invalid(where + ".emissive must be an object of material: [r, g, b]");
     for (const auto& [material, value] : in["emissive"].items()) {
       LL_ASSIGN_OR_RETURN(out.emission[material], color(value, where + ".emissive." + material));
     }
@@ -151,8 +147,7 @@ absl::StatusOr<std::vector<Rig>> read_rigs(const std::vector<uint8_t>& data) {
     LL_ASSIGN_OR_RETURN(Rig rig, read_rig(root["rigs"][i], "rigs[" + std::to_string(i) + "]"));
     if (!names.insert(rig.name).second) return invalid("has two rigs named \"" + rig.name + "\"; rename one");
     lights += rig.lights.size();
-    if (lights > kMaxLights)
-      return invalid("has more than " + std::to_string(kMaxLights) + " lights; split the file");
+    if (lights > kMaxLights) return invalid("has more than " + std::to_string(kMaxLights) + " lights; split the file");
     out.push_back(std::move(rig));
   }
   return out;
@@ -174,8 +169,7 @@ absl::StatusOr<Rig> find_rig(const std::vector<Rig>& rigs, const std::string& na
     if (rig.name == name) return rig;
     known += (known.empty() ? "" : ", ") + rig.name;
   }
-  return absl::NotFoundError("there is no rig \"" + name + "\"; the file has " +
-                             (known.empty() ? "none" : known));
+  return absl::NotFoundError("there is no rig \"" + name + "\"; the file has " + (known.empty() ? "none" : known));
 }
 
 absl::Status apply_rig(const Rig& rig, Scene* scene) {

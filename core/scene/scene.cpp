@@ -13,8 +13,7 @@ const std::array<float, 256>& srgb_table() {
     std::array<float, 256> t{};
     for (int i = 0; i < 256; ++i) {
       const double c = i / 255.0;
-      t[static_cast<size_t>(i)] =
-          static_cast<float>(c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4));
+      t[static_cast<size_t>(i)] = static_cast<float>(c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4));
     }
     return t;
   }();

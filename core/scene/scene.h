@@ -61,10 +61,10 @@ using Transform = std::array<double, 16>;
 /// One glTF node with a mesh, its geometry in world space.
 struct Object {
   std::string name;
-  Digest mesh_hash;         ///< of the local-space geometry and everything per triangle that geometry depends on
+  Digest mesh_hash;  ///< of the local-space geometry and everything per triangle that geometry depends on
   Transform transform{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
-  uint32_t ordinal = 0;     ///< 0, 1, … among objects equal in mesh_hash and transform
-  Digest id;                ///< of (mesh_hash, transform, ordinal): what receivers are keyed by
+  uint32_t ordinal = 0;  ///< 0, 1, … among objects equal in mesh_hash and transform
+  Digest id;             ///< of (mesh_hash, transform, ordinal): what receivers are keyed by
 
   std::vector<Vec3> positions;  ///< world space
   std::vector<Vec3> normals;    ///< world space, unit; one per vertex
@@ -72,8 +72,8 @@ struct Object {
   std::vector<Vec2> uv1;        ///< TEXCOORD_1, or empty
   std::vector<Triangle> triangles;
 
-  bool is_static = true;        ///< dynamic objects neither block, reflect nor receive in the bake
-  float texel_scale = 1;        ///< lightmap texels per metre, relative to the scene's
+  bool is_static = true;  ///< dynamic objects neither block, reflect nor receive in the bake
+  float texel_scale = 1;  ///< lightmap texels per metre, relative to the scene's
   Receive receive = Receive::kLightmap;
 };
 
@@ -82,13 +82,13 @@ enum class LightType : uint8_t { kPoint, kSpot, kDirectional };
 struct Light {
   LightType type = LightType::kPoint;
   std::string name;
-  Vec3 position;                  ///< point, spot
-  Vec3 direction{0, 0, -1};       ///< spot, directional: unit, the way the light travels
+  Vec3 position;             ///< point, spot
+  Vec3 direction{0, 0, -1};  ///< spot, directional: unit, the way the light travels
   Vec3 color{1, 1, 1};
-  float intensity = 1;            ///< W/sr, or W/m² for directional
-  float inner_cone_angle = 0;     ///< radians from the axis
+  float intensity = 1;         ///< W/sr, or W/m² for directional
+  float inner_cone_angle = 0;  ///< radians from the axis
   float outer_cone_angle = 0.7853981634f;
-  float range = 0;                ///< metres; 0: unlimited
+  float range = 0;  ///< metres; 0: unlimited
 };
 
 /// Perspective camera looking along `forward`.

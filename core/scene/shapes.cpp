@@ -49,8 +49,8 @@ void add_box(Object* object, Vec3 lo, Vec3 hi, uint32_t material) {
   add_wall(object, lo, hi, 2, {}, material, material);
 }
 
-void add_wall(Object* object, Vec3 lo, Vec3 hi, int thin, const std::vector<Opening>& openings,
-              uint32_t negative, uint32_t positive) {
+void add_wall(Object* object, Vec3 lo, Vec3 hi, int thin, const std::vector<Opening>& openings, uint32_t negative,
+              uint32_t positive) {
   LL_CHECK(thin == 0 || thin == 2);
   const int along = 2 - thin;
   std::vector<float> inner_u, inner_v;
@@ -65,9 +65,8 @@ void add_wall(Object* object, Vec3 lo, Vec3 hi, int thin, const std::vector<Open
   const auto solid = [&](int i, int j) {
     if (i < 0 || j < 0 || i >= nu || j >= nv) return false;
     const float u = (u_at(i) + u_at(i + 1)) / 2, v = (v_at(j) + v_at(j + 1)) / 2;
-    return std::none_of(openings.begin(), openings.end(), [&](const Opening& o) {
-      return u > o.from && u < o.to && v > o.bottom && v < o.top;
-    });
+    return std::none_of(openings.begin(), openings.end(),
+                        [&](const Opening& o) { return u > o.from && u < o.to && v > o.bottom && v < o.top; });
   };
   const float t0 = lo[thin], t1 = hi[thin];
   // Quads are given as seen for a wall thin in z; one thin in x is its mirror image, so turns them over.
@@ -170,8 +169,7 @@ void add_sphere(Object* object, Vec3 center, float radius, int segments, uint32_
   add_lathe(object, lathe, material);
 }
 
-void add_torus(Object* object, Vec3 center, int axis, float radius, float tube, int segments,
-               uint32_t material) {
+void add_torus(Object* object, Vec3 center, int axis, float radius, float tube, int segments, uint32_t material) {
   Lathe lathe;
   lathe.center = center;
   lathe.axis = axis;

@@ -22,8 +22,8 @@ struct Opening {
 };
 /// An upright box with rectangular holes. `thin_axis`: 0 (x) or 2 (z), the direction of its thickness.
 /// `negative` and `positive` are the materials of its two sides; edges and reveals take `positive`.
-void add_wall(Object* object, Vec3 lo, Vec3 hi, int thin_axis, const std::vector<Opening>& openings,
-              uint32_t negative, uint32_t positive);
+void add_wall(Object* object, Vec3 lo, Vec3 hi, int thin_axis, const std::vector<Opening>& openings, uint32_t negative,
+              uint32_t positive);
 
 /// Points (cos, sin) of `n` equal angles, by bisection. REQUIRES: n is a power of two, at least 4.
 std::vector<Vec2> circle(int n);
@@ -48,7 +48,6 @@ void add_lathe(Object* object, const Lathe& lathe, uint32_t material);
 
 void add_sphere(Object* object, Vec3 center, float radius, int segments, uint32_t material);
 /// `axis`: 0, 1, 2: the ring's axis. `radius`: to the middle of the tube.
-void add_torus(Object* object, Vec3 center, int axis, float radius, float tube, int segments,
-               uint32_t material);
+void add_torus(Object* object, Vec3 center, int axis, float radius, float tube, int segments, uint32_t material);
 
 }  // namespace lightloom

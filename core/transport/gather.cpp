@@ -15,7 +15,7 @@ namespace {
 /// What a gather ray found.
 struct Sample {
   enum Kind : uint8_t { kSurface, kSky, kDead } kind = kDead;
-  Vec3 position;   // of the hit, pushed off, for kSurface
+  Vec3 position;  // of the hit, pushed off, for kSurface
   Vec3 normal;
   Vec3 direction;  // of the ray
 };

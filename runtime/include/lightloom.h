@@ -28,13 +28,11 @@ extern "C" {
 /* Values are stable: new ones are only added. */
 typedef enum lightloom_result {
   LIGHTLOOM_OK = 0,
-  LIGHTLOOM_ERROR_INVALID_ARGUMENT =
-      -1,                         /* null pointer, wrong count, a number that is not finite or out of range */
-  LIGHTLOOM_ERROR_NO_DEVICE = -2, /* no Vulkan loader, driver or device with a compute queue */
-  LIGHTLOOM_ERROR_MISSING_FEATURE =
-      -3,                             /* the device, or an installed layer, lacks something that is needed */
-  LIGHTLOOM_ERROR_OUT_OF_MEMORY = -4, /* host or device */
-  LIGHTLOOM_ERROR_CORRUPT_ASSET = -5, /* bytes that no baker wrote, or chunks that contradict each other */
+  LIGHTLOOM_ERROR_INVALID_ARGUMENT = -1,  /* null pointer, wrong count, a number that is not finite or out of range */
+  LIGHTLOOM_ERROR_NO_DEVICE = -2,         /* no Vulkan loader, driver or device with a compute queue */
+  LIGHTLOOM_ERROR_MISSING_FEATURE = -3,   /* the device, or an installed layer, lacks something that is needed */
+  LIGHTLOOM_ERROR_OUT_OF_MEMORY = -4,     /* host or device */
+  LIGHTLOOM_ERROR_CORRUPT_ASSET = -5,     /* bytes that no baker wrote, or chunks that contradict each other */
   LIGHTLOOM_ERROR_UNSUPPORTED_ASSET = -6, /* a newer version, or too large for this device */
   LIGHTLOOM_ERROR_READ_FAILED = -7,       /* read_chunk returned non-zero */
   LIGHTLOOM_ERROR_NO_ASSET = -8,          /* nothing is loaded */

@@ -33,7 +33,7 @@ struct Cluster {
   uint first_probe;     // into probes[]
   uint probes;          // P
   uint first_correction;
-  uint rank;            // K
+  uint rank;               // K
   uint first_coefficient;  // c_0..c_K, vec4 each
   uint octets;
 };
@@ -55,11 +55,11 @@ struct RadiosityPush {
 };
 struct RelightPush {
   float sky_r, sky_g, sky_b;
-  float scale;        // 4π/N
-  uint rays;          // N
-  uint stride8;       // sh_stride / 8
-  uint first_probe;   // of this page
-  uint probes;        // in this page
+  float scale;       // 4π/N
+  uint rays;         // N
+  uint stride8;      // sh_stride / 8
+  uint first_probe;  // of this page
+  uint probes;       // in this page
 };
 struct ProjectPush {
   uint jobs;

@@ -45,8 +45,7 @@ absl::Status flush(Device* device, const Buffer& b, uint64_t size) {
 absl::Status invalidate(Device* device, const Buffer& b, uint64_t size) {
   if (b.coherent) return absl::OkStatus();
   const auto range = atoms(b, size, device->limits().nonCoherentAtomSize);
-  return vulkan_status(vkInvalidateMappedMemoryRanges(device->handle(), 1, &range),
-                       "vkInvalidateMappedMemoryRanges");
+  return vulkan_status(vkInvalidateMappedMemoryRanges(device->handle(), 1, &range), "vkInvalidateMappedMemoryRanges");
 }
 
 }  // namespace
@@ -59,14 +58,13 @@ Arena::~Arena() {
 absl::StatusOr<Buffer> Arena::buffer(uint64_t size) {
   size = std::max<uint64_t>(size, 16);
   if (size > device_->limits().maxStorageBufferRange) {
-    return absl::UnimplementedError(
-        "asset needs a buffer of " + std::to_string(size) + " bytes, this device binds at most " +
-        std::to_string(device_->limits().maxStorageBufferRange) + "; bake it coarser");
+    return absl::UnimplementedError("asset needs a buffer of " + std::to_string(size) +
+                                    " bytes, this device binds at most " +
+                                    std::to_string(device_->limits().maxStorageBufferRange) + "; bake it coarser");
   }
   auto info = vulkan_struct<VkBufferCreateInfo>(VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO);
   info.size = size;
-  info.usage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT |
-               VK_BUFFER_USAGE_TRANSFER_DST_BIT;
+  info.usage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
   info.sharingMode = VK_SHARING_MODE_EXCLUSIVE;
   VkBuffer handle = VK_NULL_HANDLE;
   buffers_.reserve(buffers_.size() + 1);
@@ -77,8 +75,7 @@ absl::StatusOr<Buffer> Arena::buffer(uint64_t size) {
   vkGetBufferMemoryRequirements(device_->handle(), handle, &need);
   LL_ASSIGN_OR_RETURN(Block* const block, block_for(need));
   const uint64_t offset = (block->used + need.alignment - 1) / need.alignment * need.alignment;
-  LL_VK_RETURN_IF_ERROR("vkBindBufferMemory",
-                        vkBindBufferMemory(device_->handle(), handle, block->memory, offset));
+  LL_VK_RETURN_IF_ERROR("vkBindBufferMemory", vkBindBufferMemory(device_->handle(), handle, block->memory, offset));
   block->used = offset + need.size;
   bytes_ += need.size;
 
@@ -96,12 +93,11 @@ absl::StatusOr<Buffer> Arena::buffer(uint64_t size) {
 }
 
 absl::StatusOr<Arena::Block*> Arena::block_for(const VkMemoryRequirements& need) {
-  const int type =
-      use_ == MemoryUse::kStaging
-          ? choose_type(device_->memory(), need.memoryTypeBits,
-                        {VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_CACHED_BIT,
-                         VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT})
-          : choose_type(device_->memory(), need.memoryTypeBits, {VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT, 0});
+  const int type = use_ == MemoryUse::kStaging
+                       ? choose_type(device_->memory(), need.memoryTypeBits,
+                                     {VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_CACHED_BIT,
+                                      VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT})
+                       : choose_type(device_->memory(), need.memoryTypeBits, {VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT, 0});
   if (type < 0) return absl::OutOfRangeError("device has no memory type for storage buffers");
   for (Block& b : blocks_) {
     const uint64_t offset = (b.used + need.alignment - 1) / need.alignment * need.alignment;
@@ -114,14 +110,12 @@ absl::StatusOr<Arena::Block*> Arena::block_for(const VkMemoryRequirements& need)
   info.allocationSize = use_ == MemoryUse::kStaging ? need.size : std::max(need.size, kBlockBytes);
   Block block{VK_NULL_HANDLE, info.allocationSize, 0, info.memoryTypeIndex, nullptr};
   blocks_.reserve(blocks_.size() + 1);
-  LL_VK_RETURN_IF_ERROR("vkAllocateMemory",
-                        vkAllocateMemory(device_->handle(), &info, nullptr, &block.memory));
+  LL_VK_RETURN_IF_ERROR("vkAllocateMemory", vkAllocateMemory(device_->handle(), &info, nullptr, &block.memory));
   blocks_.push_back(block);
   const auto flags = device_->memory().memoryTypes[type].propertyFlags;
   if (use_ != MemoryUse::kDeviceUnmapped && (flags & VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT) != 0) {
     void* mapped = nullptr;
-    LL_VK_RETURN_IF_ERROR("vkMapMemory",
-                          vkMapMemory(device_->handle(), block.memory, 0, VK_WHOLE_SIZE, 0, &mapped));
+    LL_VK_RETURN_IF_ERROR("vkMapMemory", vkMapMemory(device_->handle(), block.memory, 0, VK_WHOLE_SIZE, 0, &mapped));
     blocks_.back().mapped = static_cast<uint8_t*>(mapped);
   }
   return &blocks_.back();

@@ -16,21 +16,19 @@ constexpr const char* kValidationLayer = "VK_LAYER_KHRONOS_validation";
 constexpr uint32_t kStorageBuffers = 7;
 constexpr uint32_t kSharedBytes = 12 * 1024;
 
-VKAPI_ATTR VkBool32 VKAPI_CALL on_message(VkDebugUtilsMessageSeverityFlagBitsEXT,
-                                          VkDebugUtilsMessageTypeFlagsEXT,
+VKAPI_ATTR VkBool32 VKAPI_CALL on_message(VkDebugUtilsMessageSeverityFlagBitsEXT, VkDebugUtilsMessageTypeFlagsEXT,
                                           const VkDebugUtilsMessengerCallbackDataEXT* data, void* user) {
   static_cast<const Messages*>(user)->send(LIGHTLOOM_MESSAGE_VALIDATION, data->pMessage);
   return VK_FALSE;
 }
 
 VkDebugUtilsMessengerCreateInfoEXT messenger_info(Messages* messages) {
-  auto info = vulkan_struct<VkDebugUtilsMessengerCreateInfoEXT>(
-      VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT);
+  auto info =
+      vulkan_struct<VkDebugUtilsMessengerCreateInfoEXT>(VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT);
   info.messageSeverity =
       VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT;
   // Not GENERAL: there the loader complains about drivers that we do not use.
-  info.messageType =
-      VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_TYPE_PERFORMANCE_BIT_EXT;
+  info.messageType = VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_TYPE_PERFORMANCE_BIT_EXT;
   info.pfnUserCallback = on_message;
   info.pUserData = messages;
   return info;
@@ -82,17 +80,15 @@ void memory_barrier(VkCommandBuffer commands, VkPipelineStageFlags from_stage, V
 
 void barrier_between_passes(VkCommandBuffer commands) {
   memory_barrier(commands, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_ACCESS_SHADER_WRITE_BIT,
-                 VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT,
-                 VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT);
+                 VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT);
 }
 
 void barrier_to_all(VkCommandBuffer commands) {
-  memory_barrier(
-      commands, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT,
-      VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_WRITE_BIT,
-      VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT | VK_PIPELINE_STAGE_HOST_BIT,
-      VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_READ_BIT |
-          VK_ACCESS_TRANSFER_WRITE_BIT | VK_ACCESS_HOST_READ_BIT);
+  memory_barrier(commands, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT,
+                 VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_WRITE_BIT,
+                 VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT | VK_PIPELINE_STAGE_HOST_BIT,
+                 VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_READ_BIT |
+                     VK_ACCESS_TRANSFER_WRITE_BIT | VK_ACCESS_HOST_READ_BIT);
 }
 
 absl::StatusOr<std::unique_ptr<Device>> Device::create(bool validation, Messages messages) {
@@ -106,16 +102,14 @@ absl::StatusOr<std::unique_ptr<Device>> Device::create(bool validation, Messages
 
 absl::Status Device::create_instance(bool validation) {
   if (validation && !has_validation_layer()) {
-    return absl::OutOfRangeError(
-        std::string(kValidationLayer) +
-        " is not installed; install vulkan-validationlayers or create without validation");
+    return absl::OutOfRangeError(std::string(kValidationLayer) +
+                                 " is not installed; install vulkan-validationlayers or create without validation");
   }
   auto application = vulkan_struct<VkApplicationInfo>(VK_STRUCTURE_TYPE_APPLICATION_INFO);
   application.pEngineName = "lightloom";
   application.apiVersion = VK_API_VERSION_1_1;
 
-  const VkValidationFeatureEnableEXT enables[] = {
-      VK_VALIDATION_FEATURE_ENABLE_SYNCHRONIZATION_VALIDATION_EXT};
+  const VkValidationFeatureEnableEXT enables[] = {VK_VALIDATION_FEATURE_ENABLE_SYNCHRONIZATION_VALIDATION_EXT};
   auto features = vulkan_struct<VkValidationFeaturesEXT>(VK_STRUCTURE_TYPE_VALIDATION_FEATURES_EXT);
   features.enabledValidationFeatureCount = 1;
   features.pEnabledValidationFeatures = enables;
@@ -138,8 +132,7 @@ absl::Status Device::create_instance(bool validation) {
   const auto create = reinterpret_cast<PFN_vkCreateDebugUtilsMessengerEXT>(
       vkGetInstanceProcAddr(instance_, "vkCreateDebugUtilsMessengerEXT"));
   messenger.pNext = nullptr;
-  LL_VK_RETURN_IF_ERROR("vkCreateDebugUtilsMessengerEXT",
-                        create(instance_, &messenger, nullptr, &messenger_));
+  LL_VK_RETURN_IF_ERROR("vkCreateDebugUtilsMessengerEXT", create(instance_, &messenger, nullptr, &messenger_));
   return absl::OkStatus();
 }
 
@@ -148,8 +141,7 @@ absl::Status Device::pick_physical_device() {
   LL_VK_RETURN_IF_ERROR("vkEnumeratePhysicalDevices", vkEnumeratePhysicalDevices(instance_, &count, nullptr));
   std::vector<VkPhysicalDevice> devices(count);
   if (count > 0) {
-    LL_VK_RETURN_IF_ERROR("vkEnumeratePhysicalDevices",
-                          vkEnumeratePhysicalDevices(instance_, &count, devices.data()));
+    LL_VK_RETURN_IF_ERROR("vkEnumeratePhysicalDevices", vkEnumeratePhysicalDevices(instance_, &count, devices.data()));
   }
   int best = -1;
   for (const VkPhysicalDevice physical : devices) {
@@ -162,18 +154,16 @@ absl::Status Device::pick_physical_device() {
     timestamp_bits_ = bits;
   }
   if (best < 0) {
-    return absl::NotFoundError(
-        "no Vulkan 1.1 device with a compute queue among " + std::to_string(count) +
-        "; install a driver (mesa-vulkan-drivers has a software one) or check VK_ICD_FILENAMES");
+    return absl::NotFoundError("no Vulkan 1.1 device with a compute queue among " + std::to_string(count) +
+                               "; install a driver (mesa-vulkan-drivers has a software one) or check VK_ICD_FILENAMES");
   }
   vkGetPhysicalDeviceProperties(physical_, &properties_);
   vkGetPhysicalDeviceMemoryProperties(physical_, &memory_);
   const VkPhysicalDeviceLimits& l = properties_.limits;
-  if (l.maxPerStageDescriptorStorageBuffers < kStorageBuffers ||
-      l.maxComputeWorkGroupInvocations < gpu::kGroup || l.maxComputeSharedMemorySize < kSharedBytes) {
-    return absl::OutOfRangeError(
-        std::string("device '") + properties_.deviceName +
-        "' lacks 7 storage buffers per stage, workgroups of 64 or 12 KiB of shared memory");
+  if (l.maxPerStageDescriptorStorageBuffers < kStorageBuffers || l.maxComputeWorkGroupInvocations < gpu::kGroup ||
+      l.maxComputeSharedMemorySize < kSharedBytes) {
+    return absl::OutOfRangeError(std::string("device '") + properties_.deviceName +
+                                 "' lacks 7 storage buffers per stage, workgroups of 64 or 12 KiB of shared memory");
   }
   return absl::OkStatus();
 }

@@ -19,8 +19,7 @@ uint64_t groups_of(uint64_t invocations) { return (invocations + gpu::kGroup - 1
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<GpuAsset>> GpuAsset::load(Device* device, Transfer* transfer,
-                                                         const Pipelines* pipelines,
+absl::StatusOr<std::unique_ptr<GpuAsset>> GpuAsset::load(Device* device, Transfer* transfer, const Pipelines* pipelines,
                                                          const AssetSource& source, const GpuLimits& limits) {
   std::unique_ptr<GpuAsset> asset(new GpuAsset(device, transfer, pipelines, limits));
   const Manifest& m = source.manifest();
@@ -86,10 +85,9 @@ absl::Status GpuAsset::load_cells(const AssetSource& source) {
     if (!builder.fits(cell)) {
       if (!builder.empty()) LL_RETURN_IF_ERROR(finish_page(&builder));
       if (!builder.fits(cell)) {
-        return absl::UnimplementedError("cell " + std::to_string(i) + " needs " +
-                                        std::to_string(PageBuilder::bytes_alone(cell)) +
-                                        " bytes, a page has " + std::to_string(limits_.page_bytes) +
-                                        "; bake with smaller cells or lower ranks");
+        return absl::UnimplementedError(
+            "cell " + std::to_string(i) + " needs " + std::to_string(PageBuilder::bytes_alone(cell)) +
+            " bytes, a page has " + std::to_string(limits_.page_bytes) + "; bake with smaller cells or lower ranks");
       }
     }
     builder.add(cell);
@@ -101,8 +99,7 @@ absl::Status GpuAsset::finish_page(PageBuilder* builder) {
   Page page;
   const std::vector<uint8_t> bytes = builder->take(&page.layout);
   LL_ASSIGN_OR_RETURN(page.data, arena_.buffer(bytes.size()));
-  LL_ASSIGN_OR_RETURN(page.coefficients,
-                      arena_.buffer(uint64_t{page.layout.coefficients} * 4 * sizeof(float)));
+  LL_ASSIGN_OR_RETURN(page.coefficients, arena_.buffer(uint64_t{page.layout.coefficients} * 4 * sizeof(float)));
   LL_RETURN_IF_ERROR(transfer_->upload(page.data, bytes));
   counts_.project_bytes += page.layout.projection_bytes;
   counts_.receive_bytes += page.layout.reconstruction_bytes;
@@ -117,9 +114,9 @@ absl::Status GpuAsset::create_sets() {
   passes.insert(passes.end(), pages_.size(), Pass::kReceive);
   LL_ASSIGN_OR_RETURN(sets_, DescriptorSets::create(device_, passes));
 
-  const VkDescriptorBufferInfo radiosity[] = {
-      whole(array(SurfaceArray::kDirect)), whole(array(SurfaceArray::kAlbedo)),
-      whole(array(SurfaceArray::kEmission)), whole(array(SurfaceArray::kIrradiance)), whole(radiosity_)};
+  const VkDescriptorBufferInfo radiosity[] = {whole(array(SurfaceArray::kDirect)), whole(array(SurfaceArray::kAlbedo)),
+                                              whole(array(SurfaceArray::kEmission)),
+                                              whole(array(SurfaceArray::kIrradiance)), whole(radiosity_)};
   LL_ASSIGN_OR_RETURN(radiosity_set_, sets_->set(*pipelines_, Pass::kRadiosity, radiosity));
   for (RelightPage& p : relight_pages_) {
     const VkDescriptorBufferInfo relight[] = {whole(p.rays), whole(radiosity_), whole(sh_), whole(lambda_)};
@@ -137,11 +134,10 @@ absl::Status GpuAsset::create_sets() {
                                               whole(lambda_),
                                               whole(p.coefficients)};
     LL_ASSIGN_OR_RETURN(p.project, sets_->set(*pipelines_, Pass::kProject, project));
-    const VkDescriptorBufferInfo receive[] = {
-        section(PageSection::kClusters),        section(PageSection::kOctets),
-        section(PageSection::kElements),        section(PageSection::kUniforms),
-        section(PageSection::kMatrix),          whole(p.coefficients),
-        whole(array(SurfaceArray::kIrradiance))};
+    const VkDescriptorBufferInfo receive[] = {section(PageSection::kClusters),        section(PageSection::kOctets),
+                                              section(PageSection::kElements),        section(PageSection::kUniforms),
+                                              section(PageSection::kMatrix),          whole(p.coefficients),
+                                              whole(array(SurfaceArray::kIrradiance))};
     LL_ASSIGN_OR_RETURN(p.receive, sets_->set(*pipelines_, Pass::kReceive, receive));
   }
   return absl::OkStatus();
@@ -169,9 +165,8 @@ void GpuAsset::record_frame(VkCommandBuffer commands, VkQueryPool queries, uint3
     vkCmdWriteTimestamp(commands, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, queries, first_query + n);
   };
   timestamp(0);
-  pipelines_->dispatch(commands, Pass::kRadiosity, radiosity_set_,
-                       gpu::RadiosityPush{counts_.surface_elements}, groups_of(counts_.surface_elements),
-                       limits_.max_groups);
+  pipelines_->dispatch(commands, Pass::kRadiosity, radiosity_set_, gpu::RadiosityPush{counts_.surface_elements},
+                       groups_of(counts_.surface_elements), limits_.max_groups);
   barrier_between_passes(commands);
   timestamp(1);
   dispatch_relight(commands);
@@ -185,8 +180,7 @@ void GpuAsset::record_frame(VkCommandBuffer commands, VkQueryPool queries, uint3
   timestamp(3);
   for (const Page& p : pages_) {
     const gpu::ReceivePush push{p.layout.octets};
-    pipelines_->dispatch(commands, Pass::kReceive, p.receive, push, groups_of(p.layout.octets),
-                         limits_.max_groups);
+    pipelines_->dispatch(commands, Pass::kReceive, p.receive, push, groups_of(p.layout.octets), limits_.max_groups);
   }
   barrier_between_passes(commands);
   timestamp(4);

@@ -25,9 +25,8 @@ inline constexpr size_t kSurfaceArrays = 4;
 class GpuAsset {
  public:
   /// Reads and uploads everything. The device, transfer and pipelines must outlive it.
-  static absl::StatusOr<std::unique_ptr<GpuAsset>> load(Device* device, Transfer* transfer,
-                                                        const Pipelines* pipelines, const AssetSource& source,
-                                                        const GpuLimits& limits);
+  static absl::StatusOr<std::unique_ptr<GpuAsset>> load(Device* device, Transfer* transfer, const Pipelines* pipelines,
+                                                        const AssetSource& source, const GpuLimits& limits);
 
   struct Counts {
     uint32_t surface_elements = 0, receivers = 0, probes = 0, cells = 0, clusters = 0, pages = 0, order = 0;

@@ -12,16 +12,16 @@ namespace {
 
 // Initialiser lists that glslc wrote from shaders/*.comp.
 constexpr uint32_t kRadiositySpirv[] =
-#include "radiosity.comp.inc"
+#include "runtime/shaders/radiosity.comp.inc"
     ;
 constexpr uint32_t kRelightSpirv[] =
-#include "relight.comp.inc"
+#include "runtime/shaders/relight.comp.inc"
     ;
 constexpr uint32_t kProjectSpirv[] =
-#include "project.comp.inc"
+#include "runtime/shaders/project.comp.inc"
     ;
 constexpr uint32_t kReceiveSpirv[] =
-#include "receive.comp.inc"
+#include "runtime/shaders/receive.comp.inc"
     ;
 
 struct PassInfo {
@@ -64,8 +64,7 @@ absl::Status Pipelines::create_entry(Pass pass) {
   for (uint32_t b = 0; b < pass_info.bindings; ++b) {
     bindings.push_back({b, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr});
   }
-  auto set =
-      vulkan_struct<VkDescriptorSetLayoutCreateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO);
+  auto set = vulkan_struct<VkDescriptorSetLayoutCreateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO);
   set.bindingCount = pass_info.bindings;
   set.pBindings = bindings.data();
   LL_VK_RETURN_IF_ERROR("vkCreateDescriptorSetLayout",
@@ -84,8 +83,7 @@ absl::Status Pipelines::create_entry(Pass pass) {
   module.codeSize = pass_info.spirv.size_bytes();
   module.pCode = pass_info.spirv.data();
   VkShaderModule shader = VK_NULL_HANDLE;
-  LL_VK_RETURN_IF_ERROR("vkCreateShaderModule",
-                        vkCreateShaderModule(device_->handle(), &module, nullptr, &shader));
+  LL_VK_RETURN_IF_ERROR("vkCreateShaderModule", vkCreateShaderModule(device_->handle(), &module, nullptr, &shader));
   auto pipeline = vulkan_struct<VkComputePipelineCreateInfo>(VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO);
   pipeline.stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
   pipeline.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
@@ -111,8 +109,7 @@ void Pipelines::dispatch(VkCommandBuffer commands, Pass pass, VkDescriptorSet se
   vkCmdDispatch(commands, x, y, 1);
 }
 
-absl::StatusOr<std::unique_ptr<DescriptorSets>> DescriptorSets::create(Device* device,
-                                                                       std::span<const Pass> passes) {
+absl::StatusOr<std::unique_ptr<DescriptorSets>> DescriptorSets::create(Device* device, std::span<const Pass> passes) {
   std::unique_ptr<DescriptorSets> sets(new DescriptorSets(device));
   VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 0};
   for (const Pass p : passes) size.descriptorCount += pass_bindings(p);

@@ -40,8 +40,8 @@ class Pipelines {
   };
   explicit Pipelines(Device* device) : device_(device) {}
   absl::Status create_entry(Pass pass);
-  void dispatch(VkCommandBuffer commands, Pass pass, VkDescriptorSet set, const void* push,
-                uint32_t push_bytes, uint64_t groups, uint32_t max_groups) const;
+  void dispatch(VkCommandBuffer commands, Pass pass, VkDescriptorSet set, const void* push, uint32_t push_bytes,
+                uint64_t groups, uint32_t max_groups) const;
 
   Device* device_;
   std::array<Entry, kPasses> entries_;

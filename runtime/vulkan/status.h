@@ -21,20 +21,17 @@ T vulkan_struct(VkStructureType type) {
 /// OK for VK_SUCCESS. `what` names the call.
 inline absl::Status vulkan_status(VkResult result, const char* what) {
   if (result == VK_SUCCESS) return absl::OkStatus();
-  const std::string message =
-      std::string(what) + " failed with VkResult " + std::to_string(static_cast<int>(result));
+  const std::string message = std::string(what) + " failed with VkResult " + std::to_string(static_cast<int>(result));
   switch (result) {
     case VK_ERROR_OUT_OF_HOST_MEMORY:
     case VK_ERROR_OUT_OF_DEVICE_MEMORY:
     case VK_ERROR_TOO_MANY_OBJECTS:
-      return absl::ResourceExhaustedError(message +
-                                          ": out of memory; unload something, or bake a smaller asset");
+      return absl::ResourceExhaustedError(message + ": out of memory; unload something, or bake a smaller asset");
     case VK_ERROR_DEVICE_LOST:
       return absl::UnavailableError(message + ": the device is lost; destroy the runtime and create another");
     case VK_ERROR_INCOMPATIBLE_DRIVER:
     case VK_ERROR_INITIALIZATION_FAILED:
-      return absl::NotFoundError(message +
-                                 ": no Vulkan driver works here; install one (mesa-vulkan-drivers)");
+      return absl::NotFoundError(message + ": no Vulkan driver works here; install one (mesa-vulkan-drivers)");
     case VK_ERROR_LAYER_NOT_PRESENT:
     case VK_ERROR_EXTENSION_NOT_PRESENT:
     case VK_ERROR_FEATURE_NOT_PRESENT:

@@ -23,8 +23,7 @@ constexpr std::chrono::seconds kPatience{30};  // never reached unless something
 const ServerInfo kInfo{.version = "9.9.9", .protocol_version = 1, .method_version = "method-a"};
 
 Introduction fitting_worker() {
-  return {
-      .version = "9.9.8", .protocol_version = 1, .method_version = "method-a", .avx2 = true, .threads = 2};
+  return {.version = "9.9.8", .protocol_version = 1, .method_version = "method-a", .avx2 = true, .threads = 2};
 }
 
 enum class Transport { kInProcess, kTcp };
@@ -122,9 +121,7 @@ TEST_P(Handshake, TheHealthServiceSaysServing) {
 }
 
 INSTANTIATE_TEST_SUITE_P(, Handshake, testing::Values(Transport::kInProcess, Transport::kTcp),
-                         [](const auto& info) {
-                           return info.param == Transport::kTcp ? "Tcp" : "InProcess";
-                         });
+                         [](const auto& info) { return info.param == Transport::kTcp ? "Tcp" : "InProcess"; });
 
 TEST(HandshakeErrors, AnUnreachableServerIsAnErrorWithinTheDeadline) {
   std::string address;

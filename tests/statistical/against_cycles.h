@@ -90,8 +90,8 @@ inline void check_against_cycles(const CyclesCase& c) {
   std::printf(
       "%s, %d bounces, %d samples: rel_rmse %.5f (own noise per texel %.5f), ratio %.5f, ratio_error %.5f, "
       "%llu texels\n",
-      c.scene, c.bounces, c.samples, comparison->rel_rmse, reference->noise, comparison->ratio,
-      comparison->ratio_error, static_cast<unsigned long long>(comparison->texels));
+      c.scene, c.bounces, c.samples, comparison->rel_rmse, reference->noise, comparison->ratio, comparison->ratio_error,
+      static_cast<unsigned long long>(comparison->texels));
   EXPECT_LE(comparison->rel_rmse, c.bound);
   EXPECT_GT(comparison->ratio_error, 0);
   EXPECT_LE(std::abs(comparison->ratio - 1), 3 * comparison->ratio_error)

@@ -10,14 +10,12 @@ class AgainstCycles : public testing::TestWithParam<test::CyclesCase> {};
 
 TEST_P(AgainstCycles, Agrees) { test::check_against_cycles(GetParam()); }
 
-INSTANTIATE_TEST_SUITE_P(Bakes, AgainstCycles,
-                         testing::Values(test::CyclesCase{"cornell", 1, 128, 1024, 0.01},
-                                         test::CyclesCase{"cornell", 32, 128, 2048, 0.01},
-                                         test::CyclesCase{"rooms", 1, 128, 1024, 0.01},
-                                         test::CyclesCase{"rooms", 32, 128, 1024, 0.01},
-                                         test::CyclesCase{"city", 1, 256, 128, 0.03},
-                                         test::CyclesCase{"maze", 1, 128, 512, 0.03}),
-                         test::case_name);
+INSTANTIATE_TEST_SUITE_P(
+    Bakes, AgainstCycles,
+    testing::Values(test::CyclesCase{"cornell", 1, 128, 1024, 0.01}, test::CyclesCase{"cornell", 32, 128, 2048, 0.01},
+                    test::CyclesCase{"rooms", 1, 128, 1024, 0.01}, test::CyclesCase{"rooms", 32, 128, 1024, 0.01},
+                    test::CyclesCase{"city", 1, 256, 128, 0.03}, test::CyclesCase{"maze", 1, 128, 512, 0.03}),
+    test::case_name);
 
 // The room over x in [8.12, 12.1], z in [-4, 0] of `rooms` has no opening.
 class SealedRoom : public testing::Test {
@@ -71,8 +69,8 @@ class SealedRoom : public testing::Test {
       light.mean += (e.x + e.y + e.z) / 3;
     }
     light.mean /= std::max(1, light.texels);
-    std::printf("sealed room: %d texels, %d lit, largest %g, mean %g W/m²\n", light.texels, light.lit,
-                light.largest, light.mean);
+    std::printf("sealed room: %d texels, %d lit, largest %g, mean %g W/m²\n", light.texels, light.lit, light.largest,
+                light.mean);
     return light;
   }
 

@@ -15,8 +15,7 @@ struct Traced {
   ReferenceResult result;
 };
 
-Traced trace(const Scene& scene, float texels_per_metre, int bounces, int samples, int threads = 0,
-             uint64_t seed = 1) {
+Traced trace(const Scene& scene, float texels_per_metre, int bounces, int samples, int threads = 0, uint64_t seed = 1) {
   LayoutOptions layout_options;
   layout_options.texels_per_metre = texels_per_metre;
   absl::StatusOr<AtlasLayout> layout = make_layout(scene, layout_options);
@@ -119,8 +118,7 @@ TEST(OpenPlane, KeepsTheColourOfTheSky) {
 double view_factor(double x) {
   const double s = std::sqrt(1 + x * x);
   return 2 / (kPiExact * x * x) *
-         (0.5 * std::log(s * s * s * s / (1 + 2 * x * x)) + 2 * x * s * std::atan(x / s) -
-          2 * x * std::atan(x));
+         (0.5 * std::log(s * s * s * s / (1 + 2 * x * x)) + 2 * x * s * std::atan(x / s) - 2 * x * std::atan(x));
 }
 
 TEST(FacingPlates, ExchangeTheViewFactor) {
@@ -194,8 +192,8 @@ TEST(Noise, TellsTheTrueError) {
     }
     return std::sqrt(difference / total);
   };
-  std::printf("noise %.5f (true %.5f), with 16 times the samples %.5f (%.5f)\n", coarse.result.noise,
-              error(coarse), finer.result.noise, error(finer));
+  std::printf("noise %.5f (true %.5f), with 16 times the samples %.5f (%.5f)\n", coarse.result.noise, error(coarse),
+              finer.result.noise, error(finer));
   EXPECT_NEAR(coarse.result.noise, error(coarse), 0.1 * error(coarse));
   EXPECT_NEAR(finer.result.noise, error(finer), 0.1 * error(finer));
   // Independent samples would give 4; stratification more.
@@ -206,8 +204,7 @@ TEST(Noise, TellsTheTrueError) {
 TEST(Determinism, ThreadsDoNotMatter) {
   Scene scene = test::closed_box({3, 3, 3});
   test::add_point_light(&scene, {0.5f, 2.5f, 0.5f}, 10);
-  const Traced one = trace(scene, 4, 6, 64, 1), two = trace(scene, 4, 6, 64, 2),
-               other = trace(scene, 4, 6, 64, 1, 2);
+  const Traced one = trace(scene, 4, 6, 64, 1), two = trace(scene, 4, 6, 64, 2), other = trace(scene, 4, 6, 64, 1, 2);
   EXPECT_EQ(one.result.noise, two.result.noise);
   for (const char* channel : {"R", "G", "B", "A", "area"}) {
     EXPECT_EQ(*one.result.image.channel(channel), *two.result.image.channel(channel)) << channel;

@@ -101,8 +101,7 @@ Scene facing_plates(float gap, float emission) {
 Scene sealed_double_room(float wall_thickness) {
   Scene scene = closed_box({6, 3, 3});
   const float h = wall_thickness / 2;
-  add_solid_box(&scene, "divider", {3 - h, 0, 0}, {3 + h, 3, 3},
-                add_material(&scene, "divider", {0.5f, 0.5f, 0.5f}));
+  add_solid_box(&scene, "divider", {3 - h, 0, 0}, {3 + h, 3, 3}, add_material(&scene, "divider", {0.5f, 0.5f, 0.5f}));
   add_point_light(&scene, {1.5f, 2, 1.5f}, 10);
   identify(&scene);
   return scene;

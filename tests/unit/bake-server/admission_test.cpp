@@ -11,9 +11,7 @@ using testing::Not;
 
 const ServerInfo kServer{.version = "9.9.9", .protocol_version = 3, .method_version = "7"};
 
-WorkerInfo fitting_worker() {
-  return {.protocol_version = 3, .method_version = "7", .avx2 = true, .threads = 4};
-}
+WorkerInfo fitting_worker() { return {.protocol_version = 3, .method_version = "7", .avx2 = true, .threads = 4}; }
 
 TEST(Admission, AcceptsAWorkerThatFits) {
   const Admission admission = admit(fitting_worker(), kServer);

@@ -31,8 +31,8 @@ Scene scene_of(std::vector<Object> objects) {
 Scene boxes(int count) {
   std::vector<Object> objects;
   for (int i = 0; i < count; ++i) {
-    objects.push_back(shapes::box(
-        {0, 0, 0}, {1 + 0.25f * static_cast<float>(i % 5), 1, 1 + 0.5f * static_cast<float>(i % 3)}));
+    objects.push_back(
+        shapes::box({0, 0, 0}, {1 + 0.25f * static_cast<float>(i % 5), 1, 1 + 0.5f * static_cast<float>(i % 3)}));
   }
   return scene_of(std::move(objects));
 }
@@ -81,8 +81,8 @@ void expect_disjoint(const AtlasLayout& l) {
 }
 
 TEST(Layout, ACommonAtlasIsUsedAsItIs) {
-  const Scene scene = scene_of(
-      {square(1, {0, 0}, {0.5f, 0.5f}), square(1, {0.5f, 0}, {1, 0.5f}), square(1, {0, 0.5f}, {0.5f, 1})});
+  const Scene scene =
+      scene_of({square(1, {0, 0}, {0.5f, 0.5f}), square(1, {0.5f, 0}, {1, 0.5f}), square(1, {0, 0.5f}, {0.5f, 1})});
   LayoutOptions options;
   options.lightmap_size = 100;
   const AtlasLayout l = layout_of(scene, options);
@@ -129,8 +129,7 @@ TEST(Layout, ObjectsThatShareTexelsGetTheirOwn) {
 TEST(Layout, ATouchInOneTexelOfAThousandIsForgiven) {
   // At 64 texels: two halves, and a third object over one texel of the 4096.
   const float t = 1.0f / 64;
-  std::vector<Object> objects{square(1, {0, 0}, {0.5f, 1}), square(1, {0.5f, 0}, {1, 1}),
-                              square(1, {0, 0}, {t, t})};
+  std::vector<Object> objects{square(1, {0, 0}, {0.5f, 1}), square(1, {0.5f, 0}, {1, 1}), square(1, {0, 0}, {t, t})};
   LayoutOptions options;
   options.lightmap_size = 64;
   EXPECT_EQ(layout_of(scene_of(objects), options).mode, LayoutMode::kScene);
@@ -151,8 +150,7 @@ TEST(Layout, OwnTexcoordKeepsAspectAndIsCropped) {
 TEST(Layout, MissingOutsideOrSelfOverlappingTexcoordIsGenerated) {
   Object outside = square(1, {0, 0}, {1.5f, 1});
   Object folded = square(1, {0, 0}, {1, 1});
-  for (uint32_t k = 0; k < 3; ++k)
-    folded.uv1[folded.triangles[1].v[k]] = folded.uv1[folded.triangles[0].v[k]];
+  for (uint32_t k = 0; k < 3; ++k) folded.uv1[folded.triangles[1].v[k]] = folded.uv1[folded.triangles[0].v[k]];
   Object flat = square(1, {0.5f, 0.5f}, {0.5f, 0.5f});
   Object not_finite = square(1, {0, 0}, {1, 1});
   not_finite.uv1[2].x = std::numeric_limits<float>::quiet_NaN();

@@ -107,8 +107,7 @@ inline Object ramp(int turns) {
     const Vec2 c = circle(i, 24) * r;
     return Vec3{c.x, 0.1f * static_cast<float>(i), c.y};
   };
-  for (int i = 0; i < 24 * turns; ++i)
-    add_quad(&o, point(i, 1), point(i + 1, 1), point(i + 1, 3), point(i, 3));
+  for (int i = 0; i < 24 * turns; ++i) add_quad(&o, point(i, 1), point(i + 1, 1), point(i + 1, 3), point(i, 3));
   return o;
 }
 

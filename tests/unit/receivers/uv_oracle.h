@@ -16,8 +16,7 @@ namespace lightloom::oracle {
 using Corners = std::array<Vec2, 3>;
 
 inline double twice_area(const Corners& t) {
-  return (double{t[1].x} - t[0].x) * (double{t[2].y} - t[0].y) -
-         (double{t[1].y} - t[0].y) * (double{t[2].x} - t[0].x);
+  return (double{t[1].x} - t[0].x) * (double{t[2].y} - t[0].y) - (double{t[1].y} - t[0].y) * (double{t[2].x} - t[0].x);
 }
 
 /// Strictly inside, of either orientation.
@@ -53,8 +52,7 @@ void for_each_texel(const LightmapUv& uv, const Corners& t, const F& f) {
   const auto [l, r] = std::minmax({t[0].x, t[1].x, t[2].x});
   const auto [b, h] = std::minmax({t[0].y, t[1].y, t[2].y});
   for (int y = std::max(0, static_cast<int>(b)); y <= std::min(uv.height - 1, static_cast<int>(h)); ++y) {
-    for (int x = std::max(0, static_cast<int>(l)); x <= std::min(uv.width - 1, static_cast<int>(r)); ++x)
-      f(x, y);
+    for (int x = std::max(0, static_cast<int>(l)); x <= std::min(uv.width - 1, static_cast<int>(r)); ++x) f(x, y);
   }
 }
 
@@ -93,8 +91,7 @@ inline std::string defects(const Object& object, const LightmapUv& uv) {
   if (uv.corners.size() != object.triangles.size()) return "not one entry per triangle";
   for (const Corners& t : uv.corners) {
     for (const Vec2& p : t) {
-      if (!(p.x >= 0 && p.x <= static_cast<float>(uv.width) && p.y >= 0 &&
-            p.y <= static_cast<float>(uv.height))) {
+      if (!(p.x >= 0 && p.x <= static_cast<float>(uv.width) && p.y >= 0 && p.y <= static_cast<float>(uv.height))) {
         return "a corner lies outside";
       }
     }
@@ -125,8 +122,8 @@ inline std::string defects(const Object& object, const LightmapUv& uv) {
   for (int y = 1; y < uv.height; ++y) {
     for (int x = 1; x + 1 < uv.width; ++x) {
       const int o = owner[texel(x, y)];
-      for (const int other : {owner[texel(x - 1, y)], owner[texel(x - 1, y - 1)], owner[texel(x, y - 1)],
-                              owner[texel(x + 1, y - 1)]}) {
+      for (const int other :
+           {owner[texel(x - 1, y)], owner[texel(x - 1, y - 1)], owner[texel(x, y - 1)], owner[texel(x + 1, y - 1)]}) {
         if (o >= 0 && other >= 0 && o != other)
           found = "no gutter at texel " + std::to_string(x) + ", " + std::to_string(y);
       }

@@ -168,8 +168,7 @@ TEST(Decoder, ThreadsDoNotChangeTheResult) {
   Parallel one, three;
   one.threads = 1;
   three.threads = 3;
-  EXPECT_EQ(decode_frame(*loaded, light, none, one).irradiance,
-            decode_frame(*loaded, light, none, three).irradiance);
+  EXPECT_EQ(decode_frame(*loaded, light, none, one).irradiance, decode_frame(*loaded, light, none, three).irradiance);
 }
 
 }  // namespace

@@ -139,8 +139,7 @@ void SyntheticAsset::add_cell(const CellChunk& chunk, const std::vector<uint32_t
   manifest.cells.push_back(entry);
   manifest.cell_probes.insert(manifest.cell_probes.end(), probes.begin(), probes.end());
   for (const CellChunk::Cluster& c : chunk.clusters) {
-    manifest.clusters.push_back(
-        {c.bounds, c.receivers, c.rank(), static_cast<uint32_t>(c.probes.size()), c.error});
+    manifest.clusters.push_back({c.bounds, c.receivers, c.rank(), static_cast<uint32_t>(c.probes.size()), c.error});
   }
 }
 
@@ -180,8 +179,7 @@ SyntheticAsset random_asset(const RandomAssetOptions& options) {
 
   std::vector<Texel> texels;
   for (uint32_t o = 0; o < options.objects; ++o) {
-    const uint32_t w = count(&rng, options.side / 2, options.side),
-                   h = count(&rng, options.side / 2, options.side);
+    const uint32_t w = count(&rng, options.side / 2, options.side), h = count(&rng, options.side / 2, options.side);
     std::vector<uint32_t> keys;
     for (uint32_t key = 0; key < 2 * w * h; ++key) {
       if (rng.next_below(4) != 0) keys.push_back(key);
@@ -221,9 +219,7 @@ SyntheticAsset random_asset(const RandomAssetOptions& options) {
 
 SurfaceLight random_light(uint32_t surface_elements, uint64_t seed) {
   Rng rng(seed);
-  const auto rgb = [&rng](float hi) {
-    return Vec3{between(&rng, 0, hi), between(&rng, 0, hi), between(&rng, 0, hi)};
-  };
+  const auto rgb = [&rng](float hi) { return Vec3{between(&rng, 0, hi), between(&rng, 0, hi), between(&rng, 0, hi)}; };
   SurfaceLight light;
   for (uint32_t s = 0; s < surface_elements; ++s) {
     // Few elements are lit, as by a spot light, and fewer shine.
@@ -240,8 +236,7 @@ std::vector<double> uniform_coefficients(int order, int rays) {
   std::vector<float> y(u.size());
   for (int r = 0; r < rays; ++r) {
     sh_evaluate(order, sphere_direction(static_cast<uint32_t>(r), static_cast<uint32_t>(rays)), y);
-    for (size_t j = 0; j < u.size(); ++j)
-      u[j] += 4 * 3.14159265358979323846 / rays * static_cast<double>(y[j]);
+    for (size_t j = 0; j < u.size(); ++j) u[j] += 4 * 3.14159265358979323846 / rays * static_cast<double>(y[j]);
   }
   return u;
 }

@@ -41,8 +41,7 @@ struct TestGltf {
     const int normal = accessor(std::vector<float>{0, 0, 1, 0, 0, 1, 0, 0, 1}, "VEC3", 5126);
     const int indices = accessor(std::vector<uint16_t>{0, 1, 2}, "SCALAR", 5123);
     json["meshes"] = {
-        {{"primitives",
-          {{{"attributes", {{"POSITION", position}, {"NORMAL", normal}}}, {"indices", indices}}}}}};
+        {{"primitives", {{{"attributes", {{"POSITION", position}, {"NORMAL", normal}}}, {"indices", indices}}}}}};
   }
 
   nlohmann::json& primitive() { return json["meshes"][0]["primitives"][0]; }
@@ -57,8 +56,7 @@ struct TestGltf {
   }
 
   template <class T>
-  int accessor(const std::vector<T>& values, const std::string& type, int component,
-               bool normalized = false) {
+  int accessor(const std::vector<T>& values, const std::string& type, int component, bool normalized = false) {
     const size_t width = type == "SCALAR" ? 1 : static_cast<size_t>(type.back() - '0');
     nlohmann::json a{{"bufferView", view(values)}, {"componentType", component}, {"type", type}};
     a["count"] = values.size() / width;

@@ -48,7 +48,8 @@ void set_buffer(TestGltf& g, const char* uri) { g.json["buffers"] = {{{"uri", ur
 const Case kCases[] = {
     {"NoVersion", "asset", [](TestGltf& g) { g.json.erase("asset"); }},
     {"NoTriangles", "contains no triangles", [](TestGltf& g) { g.json["nodes"][0].erase("mesh"); }},
-    {"EmptyScene", "contains no triangles", [](TestGltf& g) { g.json["scenes"][0]["nodes"] = nlohmann::json::array(); }},
+    {"EmptyScene", "contains no triangles",
+     [](TestGltf& g) { g.json["scenes"][0]["nodes"] = nlohmann::json::array(); }},
     {"SceneMissing", "default scene 7", [](TestGltf& g) { g.json["scene"] = 7; }},
     {"NodeMissing", "node 9 does not exist", [](TestGltf& g) { g.json["scenes"][0]["nodes"] = {9}; }},
     {"MeshMissing", "mesh 5", [](TestGltf& g) { g.json["nodes"][0]["mesh"] = 5; }},
@@ -60,9 +61,18 @@ const Case kCases[] = {
        g.json["nodes"].push_back({{"children", {3}}});
        g.json["nodes"].push_back(nlohmann::json::object());
      }},
-    {"BadMatrix", "transform has the wrong number", [](TestGltf& g) { g.json["nodes"][0]["matrix"] = {1, 0, 0}; }},
-    {"ZeroQuaternion", "unit quaternion", [](TestGltf& g) { g.json["nodes"][0]["rotation"] = {0, 0, 0, 0}; }},
-    {"HugeTransform", "not finite", [](TestGltf& g) { g.json["nodes"][0]["translation"] = {1e300, 0, 0}; }},
+    {"BadMatrix", "transform has the wrong number",
+     [](TestGltf& g) {
+       g.json["nodes"][0]["matrix"] = {1, 0, 0};
+     }},
+    {"ZeroQuaternion", "unit quaternion",
+     [](TestGltf& g) {
+       g.json["nodes"][0]["rotation"] = {0, 0, 0, 0};
+     }},
+    {"HugeTransform", "not finite",
+     [](TestGltf& g) {
+       g.json["nodes"][0]["translation"] = {1e300, 0, 0};
+     }},
     {"BillionElements", "more than the limit", [](TestGltf& g) { accessor(g, 0)["count"] = 1000000000; }},
     {"BillionZeros", "more than the limit",
      [](TestGltf& g) {
@@ -74,26 +84,31 @@ const Case kCases[] = {
     {"AccessorOffset", "reach past", [](TestGltf& g) { accessor(g, 0)["byteOffset"] = 8; }},
     {"AccessorOffsetHuge", "byte offset", [](TestGltf& g) { accessor(g, 0)["byteOffset"] = 0x7fffffffffffffff; }},
     {"ViewTooLong", "past the end of buffer 0", [](TestGltf& g) { g.json["bufferViews"][0]["byteLength"] = 100000; }},
-    {"ViewOffset", "past the end of buffer 0", [](TestGltf& g) { g.json["bufferViews"][0]["byteOffset"] = 0x7ffffffffffffff0; }},
+    {"ViewOffset", "past the end of buffer 0",
+     [](TestGltf& g) { g.json["bufferViews"][0]["byteOffset"] = 0x7ffffffffffffff0; }},
     {"ViewBuffer", "buffer 3, which does not exist", [](TestGltf& g) { g.json["bufferViews"][0]["buffer"] = 3; }},
     {"ViewMissing", "buffer view 77 does not exist", [](TestGltf& g) { accessor(g, 0)["bufferView"] = 77; }},
     {"Stride", "stride", [](TestGltf& g) { g.json["bufferViews"][0]["byteStride"] = 4; }},
-    {"AccessorMissing", "accessor 66 does not exist", [](TestGltf& g) { g.primitive()["attributes"]["POSITION"] = 66; }},
+    {"AccessorMissing", "accessor 66 does not exist",
+     [](TestGltf& g) { g.primitive()["attributes"]["POSITION"] = 66; }},
     {"PositionType", "not a VEC3", [](TestGltf& g) { accessor(g, 0)["type"] = "VEC2"; }},
     {"ComponentType", "not a VEC3 of numbers", [](TestGltf& g) { accessor(g, 0)["componentType"] = 5127; }},
     {"NormalCount", "NORMAL has 2 elements", [](TestGltf& g) { accessor(g, 1)["count"] = 2; }},
     {"IndexRange", "index 3 is out of range",
-     [](TestGltf& g) { g.primitive()["indices"] = g.accessor(std::vector<uint16_t>{0, 1, 3}, "SCALAR", 5123); }},
+     [](TestGltf& g) {
+       g.primitive()["indices"] = g.accessor(std::vector<uint16_t>{0, 1, 3}, "SCALAR", 5123);
+     }},
     {"IndexFloat", "cannot hold indices",
-     [](TestGltf& g) { g.primitive()["indices"] = g.accessor(std::vector<float>{0, 1, 2}, "SCALAR", 5126); }},
+     [](TestGltf& g) {
+       g.primitive()["indices"] = g.accessor(std::vector<float>{0, 1, 2}, "SCALAR", 5126);
+     }},
     {"IndexCount", "not a multiple of 3", [](TestGltf& g) { accessor(g, 2)["count"] = 2; }},
     {"IndexMissing", "out of bounds", [](TestGltf& g) { g.primitive()["indices"] = 50; }},
     {"SparseIndex", "sparse index 200 is out of range",
      [](TestGltf& g) {
        const int i = g.view(std::vector<uint8_t>{200}), v = g.view(std::vector<float>{1, 2, 3});
-       accessor(g, 0)["sparse"] = {{"count", 1},
-                                   {"indices", {{"bufferView", i}, {"componentType", 5121}}},
-                                   {"values", {{"bufferView", v}}}};
+       accessor(g, 0)["sparse"] = {
+           {"count", 1}, {"indices", {{"bufferView", i}, {"componentType", 5121}}}, {"values", {{"bufferView", v}}}};
      }},
     {"SparseCount", "sparse",
      [](TestGltf& g) {
@@ -108,18 +123,32 @@ const Case kCases[] = {
                                    {"values", {{"bufferView", 0}}}};
      }},
     {"BufferMissing", "missing.bin", [](TestGltf& g) { set_buffer(g, "missing.bin"); }},
-    {"BufferShort", "", [](TestGltf& g) { g.json["buffers"] = {{{"uri", "data.bin"}, {"byteLength", g.bin.size() + 4}}}; }},
-    {"BufferNoUri", "has no uri", [](TestGltf& g) { g.json["buffers"] = {{{"byteLength", 8}}}; }},
+    {"BufferShort", "",
+     [](TestGltf& g) {
+       g.json["buffers"] = {{{"uri", "data.bin"}, {"byteLength", g.bin.size() + 4}}};
+     }},
+    {"BufferNoUri", "has no uri",
+     [](TestGltf& g) {
+       g.json["buffers"] = {{{"byteLength", 8}}};
+     }},
     {"UriClimbs", "not in the file's folder", [](TestGltf& g) { set_buffer(g, "../data.bin"); }},
     {"UriClimbsEncoded", "not in the file's folder", [](TestGltf& g) { set_buffer(g, "%2e%2e/data.bin"); }},
     {"UriClimbsInside", "not in the file's folder", [](TestGltf& g) { set_buffer(g, "a/../../data.bin"); }},
     {"UriAbsolute", "not in the file's folder", [](TestGltf& g) { set_buffer(g, "/etc/passwd"); }},
     {"UriScheme", "not in the file's folder", [](TestGltf& g) { set_buffer(g, "file:///etc/passwd"); }},
     {"UriHttp", "not in the file's folder", [](TestGltf& g) { set_buffer(g, "https://example.com/a.bin"); }},
-    {"ImageClimbs", "not in the file's folder", [](TestGltf& g) { use_image(g, {{"uri", "../../x.png"}}); }},
-    {"ImageMissing", "\"x.png\" is missing", [](TestGltf& g) { use_image(g, {{"uri", "x.png"}}); }},
+    {"ImageClimbs", "not in the file's folder",
+     [](TestGltf& g) {
+       use_image(g, {{"uri", "../../x.png"}});
+     }},
+    {"ImageMissing", "\"x.png\" is missing",
+     [](TestGltf& g) {
+       use_image(g, {{"uri", "x.png"}});
+     }},
     {"ImageNotPng", "neither PNG nor JPEG",
-     [](TestGltf& g) { use_image(g, {{"bufferView", 0}, {"mimeType", "image/png"}}); }},
+     [](TestGltf& g) {
+       use_image(g, {{"bufferView", 0}, {"mimeType", "image/png"}});
+     }},
     {"ImageViewOutside", "past the end of buffer 0",
      [](TestGltf& g) {
        g.json["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", 1 << 30}, {"byteLength", 100}});
@@ -127,13 +156,15 @@ const Case kCases[] = {
      }},
     {"ImageBroken", "image is broken",
      [](TestGltf& g) {
-       const int view = g.view(std::vector<uint8_t>{0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n', 0, 0, 0, 13, 'I', 'H'});
+       const int view =
+           g.view(std::vector<uint8_t>{0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n', 0, 0, 0, 13, 'I', 'H'});
        use_image(g, {{"bufferView", view}, {"mimeType", "image/png"}});
      }},
     {"ImageHuge", "too large",
      [](TestGltf& g) {
-       const int view = g.view(std::vector<uint8_t>{0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n', 0, 0, 0, 13, 'I', 'H', 'D', 'R',
-                                                    0, 0, 0x80, 0, 0, 0, 0x10, 0, 8, 6, 0, 0, 0, 0, 0, 0, 0});
+       const int view =
+           g.view(std::vector<uint8_t>{0x89, 'P',  'N', 'G', '\r', '\n', 0x1a, '\n', 0, 0, 0, 13, 'I', 'H', 'D', 'R', 0,
+                                       0,    0x80, 0,   0,   0,    0x10, 0,    8,    6, 0, 0, 0,  0,   0,   0,   0});
        use_image(g, {{"bufferView", view}, {"mimeType", "image/png"}});
      }},
     {"TextureMissing", "texture 4, which does not exist",
@@ -148,13 +179,29 @@ const Case kCases[] = {
      }},
     {"MaterialMissing", "material 3, which does not exist", [](TestGltf& g) { g.primitive()["material"] = 3; }},
     {"NegativeEmission", "emission",
-     [](TestGltf& g) { g.json["materials"] = {{{"emissiveFactor", {-1, 0, 0}}}}; }},
-    {"AlphaMode", "alphaMode \"SOME\"", [](TestGltf& g) { g.json["materials"] = {{{"alphaMode", "SOME"}}}; }},
-    {"LightType", "light type \"disco\"", [](TestGltf& g) { use_light(g, {{"type", "disco"}}); }},
-    {"LightNegative", "not negative", [](TestGltf& g) { use_light(g, {{"type", "point"}, {"intensity", -4}}); }},
-    {"LightInfinite", "finite", [](TestGltf& g) { use_light(g, {{"type", "point"}, {"intensity", 1e300}}); }},
+     [](TestGltf& g) {
+       g.json["materials"] = {{{"emissiveFactor", {-1, 0, 0}}}};
+     }},
+    {"AlphaMode", "alphaMode \"SOME\"",
+     [](TestGltf& g) {
+       g.json["materials"] = {{{"alphaMode", "SOME"}}};
+     }},
+    {"LightType", "light type \"disco\"",
+     [](TestGltf& g) {
+       use_light(g, {{"type", "disco"}});
+     }},
+    {"LightNegative", "not negative",
+     [](TestGltf& g) {
+       use_light(g, {{"type", "point"}, {"intensity", -4}});
+     }},
+    {"LightInfinite", "finite",
+     [](TestGltf& g) {
+       use_light(g, {{"type", "point"}, {"intensity", 1e300}});
+     }},
     {"LightCone", "cone angles",
-     [](TestGltf& g) { use_light(g, {{"type", "spot"}, {"spot", {{"innerConeAngle", 1}, {"outerConeAngle", 0.5}}}}); }},
+     [](TestGltf& g) {
+       use_light(g, {{"type", "spot"}, {"spot", {{"innerConeAngle", 1}, {"outerConeAngle", 0.5}}}});
+     }},
     {"LightMissing", "light that does not exist",
      [](TestGltf& g) { g.json["nodes"][0]["extensions"]["KHR_lights_punctual"]["light"] = 2; }},
     {"CameraMissing", "camera 2", [](TestGltf& g) { g.json["nodes"][0]["camera"] = 2; }},
@@ -163,9 +210,18 @@ const Case kCases[] = {
        g.json["cameras"] = {{{"type", "perspective"}, {"perspective", {{"yfov", 4.0}, {"znear", 0.1}}}}};
        g.json["nodes"][0]["camera"] = 0;
      }},
-    {"ExtrasStatic", "static must be true or false", [](TestGltf& g) { set_extras(g, {{"static", "no"}}); }},
-    {"ExtrasScale", "texel_scale must be a number above 0", [](TestGltf& g) { set_extras(g, {{"texel_scale", 0}}); }},
-    {"ExtrasReceive", "receive must be", [](TestGltf& g) { set_extras(g, {{"receive", "light"}}); }},
+    {"ExtrasStatic", "static must be true or false",
+     [](TestGltf& g) {
+       set_extras(g, {{"static", "no"}});
+     }},
+    {"ExtrasScale", "texel_scale must be a number above 0",
+     [](TestGltf& g) {
+       set_extras(g, {{"texel_scale", 0}});
+     }},
+    {"ExtrasReceive", "receive must be",
+     [](TestGltf& g) {
+       set_extras(g, {{"receive", "light"}});
+     }},
     {"ExtrasType", "must be an object", [](TestGltf& g) { set_extras(g, 3); }},
     {"RequiredExtension", "KHR_draco_mesh_compression",
      [](TestGltf& g) { g.json["extensionsRequired"] = {"KHR_draco_mesh_compression"}; }},
@@ -181,7 +237,8 @@ INSTANTIATE_TEST_SUITE_P(Gltf, Hostile, testing::ValuesIn(kCases), [](const auto
 
 std::string load_bytes(const std::vector<uint8_t>& bytes) {
   const auto path = test_folder() / "level.glb";
-  std::ofstream(path, std::ios::binary).write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  std::ofstream(path, std::ios::binary)
+      .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   const auto scene = load_gltf(path);
   return scene.ok() ? "" : std::string(scene.status().message());
 }

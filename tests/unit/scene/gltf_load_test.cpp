@@ -48,10 +48,9 @@ TEST(GltfLoad, GlbAndGltfAgree) {
 
 TEST(GltfLoad, NodesComposeInDouble) {
   TestGltf g;
-  g.json["nodes"] = {{{"children", {1}}, {"translation", {1e6, 0, 0}}, {"scale", {2, 2, 2}}},
-                     {{"mesh", 0},
-                      {"translation", {-5e5, 1, 0}},
-                      {"rotation", {0, 0, 0.7071067811865476, 0.7071067811865476}}}};
+  g.json["nodes"] = {
+      {{"children", {1}}, {"translation", {1e6, 0, 0}}, {"scale", {2, 2, 2}}},
+      {{"mesh", 0}, {"translation", {-5e5, 1, 0}}, {"rotation", {0, 0, 0.7071067811865476, 0.7071067811865476}}}};
   LOAD(scene, g);
   const Object& o = scene.objects[0];
   EXPECT_EQ(o.name, "node 1");
@@ -63,8 +62,7 @@ TEST(GltfLoad, NodesComposeInDouble) {
 TEST(GltfLoad, NormalsTurnWithTheInverseTranspose) {
   TestGltf g;
   const float h = 0.70710678f;
-  g.primitive()["attributes"]["NORMAL"] =
-      g.accessor(std::vector<float>{h, 0, h, h, 0, h, h, 0, h}, "VEC3", 5126);
+  g.primitive()["attributes"]["NORMAL"] = g.accessor(std::vector<float>{h, 0, h, h, 0, h, h, 0, h}, "VEC3", 5126);
   g.json["nodes"][0]["scale"] = {2, 1, 1};
   LOAD(scene, g);
   expect_near(scene.objects[0].normals[0], {0.4472136f, 0, 0.8944272f});  // (1/2, 0, 1) normalised
@@ -98,8 +96,7 @@ TEST(GltfLoad, StripsFansAndUnindexed) {
   const std::vector<float> quad{0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0};
   for (const int mode : {5, 6}) {
     TestGltf g;
-    const std::vector<float> corners =
-        mode == 5 ? quad : std::vector<float>{0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0};
+    const std::vector<float> corners = mode == 5 ? quad : std::vector<float>{0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0};
     g.primitive() = {{"attributes", {{"POSITION", g.accessor(corners, "VEC3", 5126)}}}, {"mode", mode}};
     LOAD(scene, g);
     ASSERT_EQ(scene.triangle_count(), 2u) << mode;
@@ -134,8 +131,7 @@ TEST(GltfLoad, NormalisedAndStridedAccessors) {
 
 TEST(GltfLoad, SparseOverNothing) {
   TestGltf g;
-  const int indices = g.view(std::vector<uint8_t>{1, 2}),
-            values = g.view(std::vector<float>{3, 0, 0, 0, 4, 0});
+  const int indices = g.view(std::vector<uint8_t>{1, 2}), values = g.view(std::vector<float>{3, 0, 0, 0, 4, 0});
   g.json["accessors"].push_back({{"componentType", 5126},
                                  {"type", "VEC3"},
                                  {"count", 3},
@@ -153,8 +149,7 @@ TEST(GltfLoad, DefectiveTrianglesAreLeftOut) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   // A good triangle, one with a NaN, and one whose corners lie on a line.
   g.primitive()["attributes"] = {
-      {"POSITION",
-       g.accessor(std::vector<float>{0, 0, 0, 1, 0, 0, 0, 1, 0, nan, 0, 0, 2, 0, 0}, "VEC3", 5126)}};
+      {"POSITION", g.accessor(std::vector<float>{0, 0, 0, 1, 0, 0, 0, 1, 0, nan, 0, 0, 2, 0, 0}, "VEC3", 5126)}};
   g.primitive()["indices"] = g.accessor(std::vector<uint32_t>{0, 1, 2, 0, 1, 3, 0, 1, 4}, "SCALAR", 5125);
   LOAD(scene, g);
   EXPECT_EQ(scene.triangle_count(), 1u);
@@ -202,8 +197,7 @@ TEST(GltfLoad, LightsShineAlongTheirNodesMinusZ) {
                              {"translation", {1, 2, 3}},
                              {"scale", {2, 2, 2}},
                              {"extensions", {{"KHR_lights_punctual", {{"light", 0}}}}}});
-  g.json["nodes"].push_back(
-      {{"rotation", {0, -h, 0, h}}, {"extensions", {{"KHR_lights_punctual", {{"light", 1}}}}}});
+  g.json["nodes"].push_back({{"rotation", {0, -h, 0, h}}, {"extensions", {{"KHR_lights_punctual", {{"light", 1}}}}}});
   LOAD(scene, g);
   ASSERT_EQ(scene.lights.size(), 2u);
   const Light& spot = scene.lights[0];
@@ -224,8 +218,7 @@ TEST(GltfLoad, Cameras) {
   g.json["cameras"] = {
       {{"type", "perspective"}, {"perspective", {{"yfov", 0.7}, {"aspectRatio", 1.5}, {"znear", 0.1}}}}};
   g.json["scenes"][0]["nodes"] = {0, 1};
-  g.json["nodes"].push_back(
-      {{"name", "eye"}, {"camera", 0}, {"rotation", {0, 1, 0, 0}}, {"translation", {4, 5, 6}}});
+  g.json["nodes"].push_back({{"name", "eye"}, {"camera", 0}, {"rotation", {0, 1, 0, 0}}, {"translation", {4, 5, 6}}});
   LOAD(scene, g);
   ASSERT_EQ(scene.cameras.size(), 1u);
   const Camera& c = scene.cameras[0];
@@ -299,8 +292,7 @@ TEST(GltfIdentity, Uv0CountsOnlyUnderMasks) {
     TestGltf g;
     const char* set = uv1 ? "TEXCOORD_1" : "TEXCOORD_0";
     g.primitive()["attributes"][set] = g.accessor(std::vector<float>{u, 0, 1, 0, 0, 1}, "VEC2", 5126);
-    g.json["materials"] = {
-        {{"alphaMode", mode}, {"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}}};
+    g.json["materials"] = {{{"alphaMode", mode}, {"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}}};
     g.primitive()["material"] = 0;
     // A PNG of one white texel.
     const char* png =

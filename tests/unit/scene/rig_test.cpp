@@ -72,8 +72,7 @@ TEST(Rig, Errors) {
       {R"({"rigs": [{"name": "a", "lights": [{"type": "laser"}]}]})", "rigs[0] \"a\".lights[0].type"},
       {R"({"rigs": [{"name": "a", "lights": [{"type": "point"}]}]})", ".position is missing"},
       {R"({"rigs": [{"name": "a", "lights": [{"type": "directional"}]}]})", ".direction is missing"},
-      {R"({"rigs": [{"name": "a", "lights": [{"type": "point", "position": [1, 2]}]}]})",
-       "array of 3 numbers"},
+      {R"({"rigs": [{"name": "a", "lights": [{"type": "point", "position": [1, 2]}]}]})", "array of 3 numbers"},
       {R"({"rigs": [{"name": "a", "lights": [{"type": "point", "position": [1, 2, 1e39]}]}]})",
        "position[2] must be a finite"},
       {R"({"rigs": [{"name": "a", "lights": [{"type": "point", "position": [1, 2, 1e999]}]}]})", "not JSON"},
@@ -89,8 +88,7 @@ TEST(Rig, Errors) {
   for (const auto& [text, expected] : cases) {
     const auto rigs = parse(text);
     ASSERT_FALSE(rigs.ok()) << text;
-    EXPECT_THAT(std::string(rigs.status().message()),
-                testing::AllOf(HasSubstr(expected), HasSubstr("lights.json")))
+    EXPECT_THAT(std::string(rigs.status().message()), testing::AllOf(HasSubstr(expected), HasSubstr("lights.json")))
         << text;
   }
 }

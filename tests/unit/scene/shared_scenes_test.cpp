@@ -30,8 +30,7 @@ class SharedScenes : public testing::TestWithParam<Expected> {};
 TEST_P(SharedScenes, LoadWithTheirTrianglesAndRigs) {
   const std::filesystem::path folder = scenes_folder() / GetParam().name;
   if (!std::filesystem::exists(folder / "scene.glb")) {
-    GTEST_SKIP() << "no " << GetParam().name
-                 << "/scene.glb: set LIGHTLOOM_SCENES to the folder of the test scenes";
+    GTEST_SKIP() << "no " << GetParam().name << "/scene.glb: set LIGHTLOOM_SCENES to the folder of the test scenes";
   }
   const auto scene = load_gltf(folder / "scene.glb");
   ASSERT_TRUE(scene.ok()) << scene.status();

@@ -74,8 +74,7 @@ TEST_F(AssetTest, PuttingTwiceLeavesTheFileAlone) {
 TEST_F(AssetTest, PuttingMendsADamagedChunk) {
   const ChunkStore store(loom_);
   const ChunkRef ref = *store.put(kBytes);
-  for (const std::vector<uint8_t>& damaged :
-       {std::vector<uint8_t>{1, 2, 3, 4, 6}, std::vector<uint8_t>{1, 2}}) {
+  for (const std::vector<uint8_t>& damaged : {std::vector<uint8_t>{1, 2, 3, 4, 6}, std::vector<uint8_t>{1, 2}}) {
     overwrite(store.path(ref.digest), damaged);
     EXPECT_FALSE(store.get(ref).ok());
     ASSERT_TRUE(store.put(kBytes).ok());

@@ -24,8 +24,8 @@ constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInf = std::numeric_limits<float>::infinity();
 
 // Where the sample cell's arrays start, and fields of the records.
-constexpr size_t kObjects = 64, kReceivers = 144, kUniform = 192, kClusters = 208, kProbes = 304,
-                 kCorrection = 320, kProjection = 336, kReconstruction = 416;
+constexpr size_t kObjects = 64, kReceivers = 144, kUniform = 192, kClusters = 208, kProbes = 304, kCorrection = 320,
+                 kProjection = 336, kReconstruction = 416;
 constexpr size_t kObjectWidth = 32, kObjectHeight = 36;
 constexpr size_t kClusterSize = 48;
 
@@ -72,11 +72,9 @@ TEST(HostileCell, MagicVersionAndOrder) {
 
 TEST(HostileCell, EveryCountIsChecked) {
   const Bytes good = encode_cell(sample_cell());
-  for (const size_t at :
-       {16u, 20u, 24u, 28u, 48u}) {  // objects, receivers, clusters, cluster probes, columns
+  for (const size_t at : {16u, 20u, 24u, 28u, 48u}) {  // objects, receivers, clusters, cluster probes, columns
     const uint32_t count = peek<uint32_t>(good, at);
-    for (const uint32_t wrong :
-         {0u, count - 1, count + 1, count + 1000, 0x40000000u, 0x7fffffffu, 0xffffffffu}) {
+    for (const uint32_t wrong : {0u, count - 1, count + 1, count + 1000, 0x40000000u, 0x7fffffffu, 0xffffffffu}) {
       EXPECT_FALSE(decode_cell(poke(good, at, wrong)).ok()) << at << " " << wrong;
     }
   }
@@ -112,8 +110,7 @@ TEST(HostileCell, LightmapSizes) {
 
 TEST(HostileCell, CoefficientsMustBeFinite) {
   const Bytes good = encode_cell(sample_cell());
-  for (const float v : {kNan, kInf, -kInf})
-    expect_cell_rejected(poke(good, kCorrection + 4, v), "not finite");
+  for (const float v : {kNan, kInf, -kInf}) expect_cell_rejected(poke(good, kCorrection + 4, v), "not finite");
   for (const Half h : {Half{0x7c00}, Half{0xfc00}, Half{0x7e00}, Half{0x7c01}}) {
     expect_cell_rejected(poke(good, kProjection + 6, h), "not finite");
     expect_cell_rejected(poke(good, kReconstruction + 46, h), "not finite");  // padding too
@@ -141,11 +138,9 @@ TEST(HostileCell, ClustersMustFollowOn) {
 TEST(HostileCell, ClusterBoundsAndError) {
   const Bytes good = encode_cell(sample_cell());
   for (size_t field = 16; field <= 40; field += 4) {
-    for (const float v : {kNan, kInf, -kInf})
-      expect_cell_rejected(poke(good, kClusters + field, v), "not finite");
+    for (const float v : {kNan, kInf, -kInf}) expect_cell_rejected(poke(good, kClusters + field, v), "not finite");
   }
-  for (const size_t lo : {16u, 20u, 24u})
-    expect_cell_rejected(poke(good, kClusters + lo, 1e6f), "bounds are empty");
+  for (const size_t lo : {16u, 20u, 24u}) expect_cell_rejected(poke(good, kClusters + lo, 1e6f), "bounds are empty");
 }
 
 TEST(HostileRelight, Fields) {
@@ -160,8 +155,7 @@ TEST(HostileRelight, Fields) {
       EXPECT_FALSE(decode_relight(poke(good, at, wrong)).ok()) << at << " " << wrong;
     }
   }
-  for (const size_t at : {16u, 20u, 24u})
-    expect_relight_rejected(poke(good, at, kNan), "position is not finite");
+  for (const size_t at : {16u, 20u, 24u}) expect_relight_rejected(poke(good, at, kNan), "position is not finite");
   expect_relight_rejected(poke<uint32_t>(good, 32 + kObjectWidth, 0), "lightmap size is out of range");
   expect_relight_rejected(poke<uint32_t>(good, 72 + kObjectHeight, 20000), "lightmap size is out of range");
   expect_relight_rejected(poke<uint32_t>(good, 112 + 4, 34), "outside its objects' lightmaps");
@@ -199,8 +193,7 @@ TEST(HostileSurface, Fields) {
 TEST(HostileSurface, AnyNormalBitsDecodeToAUnitVector) {
   const Bytes good = encode_surface(sample_surface());
   Rng rng(5);
-  std::vector<uint32_t> patterns = {0,          0x80008000, 0x00008000, 0x80000000,
-                                    0x7fff7fff, 0x80007fff, 0xffffffff};
+  std::vector<uint32_t> patterns = {0, 0x80008000, 0x00008000, 0x80000000, 0x7fff7fff, 0x80007fff, 0xffffffff};
   for (int i = 0; i < 10000; ++i) patterns.push_back(rng.next_u32());
   for (const uint32_t bits : patterns) {
     const auto c = decode_surface(poke(good, 128, bits));
@@ -256,8 +249,7 @@ TEST_P(HostileBytes, RandomFlipsNeverCrash) {
     const uint32_t flips = 1 + rng.next_below(4);
     for (uint32_t f = 0; f < flips; ++f) {
       uint8_t& b = bytes[rng.next_below(static_cast<uint32_t>(bytes.size()))];
-      b = rng.next_below(2) ? static_cast<uint8_t>(b ^ 1u << rng.next_below(8))
-                            : static_cast<uint8_t>(rng.next_u32());
+      b = rng.next_below(2) ? static_cast<uint8_t>(b ^ 1u << rng.next_below(8)) : static_cast<uint8_t>(rng.next_u32());
     }
     rejected += !decode_any(bytes);
   }

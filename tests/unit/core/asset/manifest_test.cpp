@@ -33,9 +33,7 @@ uint32_t slow_crc(const uint8_t* data, size_t size) {
   return ~c;
 }
 
-Bytes with_crc(Bytes bytes) {
-  return poke(bytes, bytes.size() - 4, slow_crc(bytes.data(), bytes.size() - 4));
-}
+Bytes with_crc(Bytes bytes) { return poke(bytes, bytes.size() - 4, slow_crc(bytes.data(), bytes.size() - 4)); }
 
 std::string error_of(const Bytes& bytes) {
   const auto m = decode_manifest(bytes);
@@ -116,8 +114,7 @@ TEST(Manifest, EveryCountIsChecked) {
   for (const size_t at : {8u, 12u, 16u, 20u, 24u, 28u, 124u}) {  // six counts, bytes of the method version
     const uint32_t count = peek<uint32_t>(good, at);
     for (const uint32_t wrong : {count - 1, count + 1, count + 100, 0x20000000u, 0x7fffffffu, 0xffffffffu}) {
-      if (at == 24 && wrong == 4)
-        continue;  // a fourth, unused entry lies where zeros pad the three: harmless
+      if (at == 24 && wrong == 4) continue;  // a fourth, unused entry lies where zeros pad the three: harmless
       EXPECT_FALSE(decode_manifest(with_crc(poke(good, at, wrong))).ok()) << at << " " << wrong;
     }
   }

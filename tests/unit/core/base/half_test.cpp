@@ -69,8 +69,7 @@ TEST(Half, AgreesWithTheOracleOnRandomFloats) {
   for (int i = 0; i < 500000; ++i) {
     // Half of them in the range of halfs, where random bits seldom fall.
     const uint32_t bits = rng.next_u32();
-    const float f =
-        i % 2 ? std::bit_cast<float>(bits) : std::bit_cast<float>((bits & 0x8fffffffu) + 0x30000000u);
+    const float f = i % 2 ? std::bit_cast<float>(bits) : std::bit_cast<float>((bits & 0x8fffffffu) + 0x30000000u);
     if (std::isnan(f)) continue;
     ASSERT_EQ(float_to_half(f), slow_float_to_half(f)) << f;
   }

@@ -18,8 +18,7 @@ size_t bin_of(Vec3 d) {
   double phi = std::atan2(static_cast<double>(d.y), static_cast<double>(d.x));
   if (phi < 0) phi += kTwoPi;
   const int z = std::clamp(static_cast<int>((static_cast<double>(d.z) + 1) / 2 * kZBins), 0, kZBins - 1);
-  return static_cast<size_t>(z * kPhiBins +
-                             std::min(static_cast<int>(phi / kTwoPi * kPhiBins), kPhiBins - 1));
+  return static_cast<size_t>(z * kPhiBins + std::min(static_cast<int>(phi / kTwoPi * kPhiBins), kPhiBins - 1));
 }
 
 /// Probability of each bin: the density integrated by midpoints (bins have equal solid angle 4π ÷ bins).
@@ -30,8 +29,7 @@ std::vector<double> probabilities(const std::function<double(Vec3)>& pdf) {
     for (int k = 0; k < kPhiBins * kSteps; ++k) {
       const double z = -1 + 2 * (i + 0.5) / (kZBins * kSteps), phi = kTwoPi * (k + 0.5) / (kPhiBins * kSteps);
       const double r = std::sqrt(1 - z * z);
-      const Vec3 d{static_cast<float>(r * std::cos(phi)), static_cast<float>(r * std::sin(phi)),
-                   static_cast<float>(z)};
+      const Vec3 d{static_cast<float>(r * std::cos(phi)), static_cast<float>(r * std::sin(phi)), static_cast<float>(z)};
       p[static_cast<size_t>(i / kSteps * kPhiBins + k / kSteps)] +=
           pdf(d) * 2 * kTwoPi / (kZBins * kSteps * kPhiBins * kSteps);
     }

@@ -76,8 +76,7 @@ TEST(Sh, AdditionTheorem) {
     for (int l = 0; l <= kMaxShOrder; ++l) {
       double sum = 0;
       for (int j = l * l; j < (l + 1) * (l + 1); ++j)
-        sum +=
-            static_cast<double>(y[static_cast<size_t>(j)]) * static_cast<double>(y[static_cast<size_t>(j)]);
+        sum += static_cast<double>(y[static_cast<size_t>(j)]) * static_cast<double>(y[static_cast<size_t>(j)]);
       const double expected = (2 * l + 1) / (4 * kPiD);
       ASSERT_NEAR(sum, expected, 2e-5 * expected) << l;
     }
@@ -106,8 +105,7 @@ TEST(Sh, LowerOrdersArePrefixes) {
   sh_evaluate(kMaxShOrder, d, all);
   for (int order = 0; order <= kMaxShOrder; ++order) {
     sh_evaluate(order, d, some);
-    for (size_t j = 0; j < static_cast<size_t>(sh_count(order)); ++j)
-      EXPECT_EQ(some[j], all[j]) << order << " " << j;
+    for (size_t j = 0; j < static_cast<size_t>(sh_count(order)); ++j) EXPECT_EQ(some[j], all[j]) << order << " " << j;
   }
 }
 

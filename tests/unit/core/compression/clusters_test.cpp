@@ -31,8 +31,7 @@ Level strip(Index receivers, Index probes, float noise, uint64_t seed) {
   Level level;
   level.transport = Matrix::Zero(receivers, probes * kJ);
   for (Index r = 0; r < receivers; ++r) {
-    const float x =
-        (static_cast<float>(r) + 0.5f) / static_cast<float>(receivers) * static_cast<float>(probes);
+    const float x = (static_cast<float>(r) + 0.5f) / static_cast<float>(receivers) * static_cast<float>(probes);
     level.positions.push_back({x, 0.1f * rng.next_float(), 0});
     const float openness = r % 50 == 0 ? 1.0f : 0.5f + 0.4f * rng.next_float();
     float total = 0;
@@ -128,8 +127,7 @@ TEST(CompressCell, RandomLightErrsWithinTheBound) {
   const CompressedCell cell = compress_cell(level.transport, level.positions, options(8, 0.02f));
   Matrix weighted = level.transport;
   for (Index column = 0; column < weighted.cols(); ++column) {
-    weighted.col(column) /=
-        static_cast<float>(1 + static_cast<int>(std::sqrt(static_cast<double>(column % kJ))));
+    weighted.col(column) /= static_cast<float>(1 + static_cast<int>(std::sqrt(static_cast<double>(column % kJ))));
   }
   Rng rng(4);
   for (int repeat = 0; repeat < 20; ++repeat) {
@@ -154,8 +152,7 @@ TEST(CompressCell, UniformFieldIsExactAtEveryRank) {
   for (const int rank : {0, 1, 8, 32}) {
     for (const uint32_t min_receivers : {20u, 1u << 30}) {
       const Level level = strip(200, 8, 1.0f, 5);
-      const CompressedCell cell =
-          compress_cell(level.transport, level.positions, options(rank, 0.001f, min_receivers));
+      const CompressedCell cell = compress_cell(level.transport, level.positions, options(rank, 0.001f, min_receivers));
       std::vector<float> uniform(static_cast<size_t>(level.transport.cols()), 0);
       for (Index p = 0; p < level.probes(); ++p) uniform[static_cast<size_t>(p * kJ)] = kShUniform;
       const std::vector<float> e = decode(cell, uniform);
@@ -207,8 +204,7 @@ TEST(CompressCell, SameInputSameBytes) {
 TEST(CompressCell, ClustersCoverAllReceiversOnceAndHonourTheirMinimum) {
   const Level level = strip(500, 10, 2.0f, 8);
   for (const uint32_t min_receivers : {1u, 30u, 100u, 250u, 251u}) {
-    const CompressedCell cell =
-        compress_cell(level.transport, level.positions, options(2, 0.001f, min_receivers));
+    const CompressedCell cell = compress_cell(level.transport, level.positions, options(2, 0.001f, min_receivers));
     uint32_t next = 0;
     for (const CellChunk::Cluster& c : cell.clusters) {
       EXPECT_EQ(c.first_receiver, next);
@@ -216,8 +212,7 @@ TEST(CompressCell, ClustersCoverAllReceiversOnceAndHonourTheirMinimum) {
       next += c.receivers;
       for (uint32_t r = c.first_receiver; r < next; ++r) {
         const Vec3 p = level.positions[cell.order.at(r)];
-        EXPECT_TRUE(p.x >= c.bounds.lo.x && p.x <= c.bounds.hi.x && p.y >= c.bounds.lo.y &&
-                    p.y <= c.bounds.hi.y);
+        EXPECT_TRUE(p.x >= c.bounds.lo.x && p.x <= c.bounds.hi.x && p.y >= c.bounds.lo.y && p.y <= c.bounds.hi.y);
       }
     }
     EXPECT_EQ(next, 500u);
@@ -290,8 +285,7 @@ TEST(CompressCell, PrefixesOfTheColumnsAreCoarserClusters) {
   CompressedCell cell = compress_cell(level.transport, level.positions, options(16, 0.001f));
   CellChunk::Cluster& c = cell.clusters.at(0);
   ASSERT_EQ(c.rank(), 16u);
-  const size_t row = c.probes.size() * static_cast<size_t>(sh_stride(kOrder)),
-               column = (c.receivers + 7) / 8 * 8;
+  const size_t row = c.probes.size() * static_cast<size_t>(sh_stride(kOrder)), column = (c.receivers + 7) / 8 * 8;
   double previous = measured_error(level, cell), previous_energy = 0;
   EXPECT_NEAR(previous, cell.error, kRounding);
   while (c.rank() > 0) {

@@ -24,8 +24,8 @@ Matrix noise(Index rows, Index cols, uint64_t seed) {
 /// Singular values fall by `decay` each.
 Matrix decaying(Index rows, Index cols, float decay, uint64_t seed) {
   const Index n = std::min(rows, cols);
-  const Eigen::MatrixXf u = Eigen::HouseholderQR<Eigen::MatrixXf>(noise(rows, n, seed)).householderQ() *
-                            Eigen::MatrixXf::Identity(rows, n);
+  const Eigen::MatrixXf u =
+      Eigen::HouseholderQR<Eigen::MatrixXf>(noise(rows, n, seed)).householderQ() * Eigen::MatrixXf::Identity(rows, n);
   const Eigen::MatrixXf v = Eigen::HouseholderQR<Eigen::MatrixXf>(noise(cols, n, seed + 1)).householderQ() *
                             Eigen::MatrixXf::Identity(cols, n);
   Eigen::VectorXf sigma(n);
@@ -64,8 +64,7 @@ TEST(TruncatedSvd, AgreesWithJacobi) {
     const double best = exact.tail(exact.size() - rank).norm();
     EXPECT_NEAR(residual(a, svd), best, 1e-5 + 0.001 * best) << rows << "×" << cols;
     const Eigen::MatrixXf gram = svd.u.transpose() * svd.u;
-    EXPECT_LT((gram - Eigen::MatrixXf::Identity(rank, rank)).cwiseAbs().maxCoeff(), 1e-5f)
-        << rows << "×" << cols;
+    EXPECT_LT((gram - Eigen::MatrixXf::Identity(rank, rank)).cwiseAbs().maxCoeff(), 1e-5f) << rows << "×" << cols;
   }
 }
 

@@ -94,10 +94,8 @@ TEST(ProbeGrid, TiesGoByIndex) {
     }
   }
   const ProbeGrid grid(probes, 1);
-  for (const Vec3 p :
-       {Vec3{0, 0, 0}, Vec3{0.5f, 0.5f, 0.5f}, Vec3{1, 0.5f, -1}, Vec3{-4, -4, -4}, Vec3{4, 4, 4}}) {
-    for (int count = 1; count <= 40; ++count)
-      expect_equal(grid.nearest(p, count), brute_force(probes, 1, p, count));
+  for (const Vec3 p : {Vec3{0, 0, 0}, Vec3{0.5f, 0.5f, 0.5f}, Vec3{1, 0.5f, -1}, Vec3{-4, -4, -4}, Vec3{4, 4, 4}}) {
+    for (int count = 1; count <= 40; ++count) expect_equal(grid.nearest(p, count), brute_force(probes, 1, p, count));
   }
 }
 

@@ -44,8 +44,7 @@ struct World {
   int count(const std::string& name, bool back) const {
     const uint32_t o = object(name);
     int n = 0;
-    for (uint32_t i = receivers.ranges[o].begin; i < receivers.ranges[o].end; ++i)
-      n += receivers.all[i].back == back;
+    for (uint32_t i = receivers.ranges[o].begin; i < receivers.ranges[o].end; ++i) n += receivers.all[i].back == back;
     return n;
   }
   size_t texels(const std::string& name) const { return receivers.grids[object(name)].texels.size(); }
@@ -225,8 +224,7 @@ TEST(Locate, NearestElse) {
         const int x = static_cast<int>(p.x), y = static_cast<int>(p.y);
         const auto distance = [&](uint32_t receiver) {
           const uint32_t key = w.receivers.all[receiver].key;
-          const float dx = static_cast<float>(key % 40) + 0.5f - p.x,
-                      dy = static_cast<float>(key / 40) + 0.5f - p.y;
+          const float dx = static_cast<float>(key % 40) + 0.5f - p.x, dy = static_cast<float>(key / 40) + 0.5f - p.y;
           return dx * dx + dy * dy;
         };
         // All within eight texels.

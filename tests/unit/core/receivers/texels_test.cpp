@@ -34,8 +34,8 @@ Mapped quad(int width, int height, float x0, float y0, float x1, float y1) {
 
 double triangle_area(const Object& object, uint32_t t) {
   const auto& v = object.triangles[t].v;
-  return static_cast<double>(length(cross(object.positions[v[1]] - object.positions[v[0]],
-                                          object.positions[v[2]] - object.positions[v[0]]))) /
+  return static_cast<double>(length(
+             cross(object.positions[v[1]] - object.positions[v[0]], object.positions[v[2]] - object.positions[v[0]]))) /
          2;
 }
 
@@ -151,8 +151,7 @@ TEST(Rasterise, AreasAddUp) {
     }
     EXPECT_NEAR(texels, expected, 1e-4 * expected);
     EXPECT_NEAR(fragments, expected, 1e-4 * expected);
-    for (const auto& [t, area] : by_triangle)
-      EXPECT_NEAR(area, triangle_area(m.object, t), 1e-4 * (area + 0.01)) << t;
+    for (const auto& [t, area] : by_triangle) EXPECT_NEAR(area, triangle_area(m.object, t), 1e-4 * (area + 0.01)) << t;
     EXPECT_EQ(by_triangle.size(), m.object.triangles.size());
   }
 }
@@ -178,8 +177,7 @@ TEST(Rasterise, KnowsWhichCentresAreCovered) {
         const auto it = found.find({x, y});
         EXPECT_EQ(it != found.end() && it->second->centre_covered, covered) << x << ' ' << y;
         if (it == found.end() || !covered) continue;
-        EXPECT_TRUE(inside(m.uv.corners[it->second->triangle], x + 0.5, y + 0.5))
-            << "the centre's own triangle";
+        EXPECT_TRUE(inside(m.uv.corners[it->second->triangle], x + 0.5, y + 0.5)) << "the centre's own triangle";
       }
     }
   }

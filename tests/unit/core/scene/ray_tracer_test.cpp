@@ -156,8 +156,7 @@ TEST(RayTracer, DynamicObjectsAreNotThere) {
 
 TEST(RayTracer, MirroredObjectsKeepTheirFront) {
   Scene scene;
-  test::add_solid_box(&scene, "box", {-3, 0, 0}, {-1, 1, 1},
-                      test::add_material(&scene, "grey", {0.5f, 0.5f, 0.5f}));
+  test::add_solid_box(&scene, "box", {-3, 0, 0}, {-1, 1, 1}, test::add_material(&scene, "grey", {0.5f, 0.5f, 0.5f}));
   scene.objects[0].transform[0] = -1;  // its mesh lies at x in [1, 3] and is turned over
   test::identify(&scene);
   const auto file = std::filesystem::path(testing::TempDir()) / "ray_tracer_test_mirrored.glb";
@@ -245,9 +244,8 @@ std::vector<Answer> answers(const Scene& scene) {
     const Vec3 origin = Vec3{rng.next_float() - 0.5f, rng.next_float() - 0.5f, rng.next_float() - 0.5f} * 20;
     const Vec3 direction = square_to_sphere(rng.next_float(), rng.next_float());
     const Hit hit = tracer->closest(origin, direction, 50);
-    out.push_back({hit ? scene.objects[hit.object].id : Digest{}, hit.triangle,
-                   std::bit_cast<uint32_t>(hit.t), std::bit_cast<uint32_t>(hit.b1),
-                   std::bit_cast<uint32_t>(hit.b2), static_cast<bool>(hit), hit.back,
+    out.push_back({hit ? scene.objects[hit.object].id : Digest{}, hit.triangle, std::bit_cast<uint32_t>(hit.t),
+                   std::bit_cast<uint32_t>(hit.b1), std::bit_cast<uint32_t>(hit.b2), static_cast<bool>(hit), hit.back,
                    tracer->occluded(origin, direction, 5)});
   }
   return out;
