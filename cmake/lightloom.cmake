@@ -34,6 +34,12 @@ find_package(Vulkan REQUIRED)
 find_package(ZLIB REQUIRED)
 find_program(GRPC_CPP_PLUGIN grpc_cpp_plugin REQUIRED)
 
+# lightloom_quick_build(<cpp>...)
+# For parsing and plumbing, where seconds of compilation buy no speed: heavy headers, -O1.
+function(lightloom_quick_build)
+  set_property(SOURCE ${ARGN} APPEND PROPERTY COMPILE_OPTIONS $<$<CONFIG:Release>:-O1>)
+endfunction()
+
 # lightloom_module(<name> SOURCES <cpp>... [PUBLIC <targets>...] [PRIVATE <targets>...])
 # A static library named lightloom_<name>, whose headers are included by their path from the root of the repository.
 # PUBLIC names what its headers show, PRIVATE what only its .cpp files use; tests/link_rules checks both lists.

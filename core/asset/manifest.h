@@ -22,7 +22,7 @@ struct BakeParams {
   int32_t rays = 256;             ///< gather rays per receiver, a square number
   int32_t relight_rays = 4096;    ///< per probe
   int32_t max_rank = 32;          ///< coefficients per cluster, without the uniform one
-  float threshold = 0.05f;        ///< relative Frobenius error at which a cluster's rank ends
+  float threshold = 0.02f;        ///< relative Frobenius error at which a cluster's rank ends
   int32_t cell_receivers = 1024;  ///< a bake cell holds fewer receivers than this
   float texels_per_metre = 0;     ///< lightmap density; 0 in a request: chosen from the scene
   int32_t lightmap_size = 0;      ///< side of the scene atlas; 0: from texels_per_metre

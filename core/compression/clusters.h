@@ -15,7 +15,7 @@ namespace lightloom {
 struct CompressionOptions {
   int order = 7;
   int max_rank = 32;
-  float threshold = 0.05f;       ///< relative Frobenius error at which the rank ends
+  float threshold = 0.02f;       ///< relative Frobenius error at which the rank ends
   uint32_t min_receivers = 128;  ///< > 0: a cluster is not split below this many receivers
   uint32_t relight_rays = 0;     ///< of the probes: the uniform field that is kept is sh_uniform(order, relight_rays)
   uint64_t seed = 0;
