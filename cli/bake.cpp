@@ -27,7 +27,7 @@ nlohmann::json to_json(const BakeReport& r) {
       {"probes_repair", r.repairs},
       {"cells", r.cells},
       {"clusters", r.clusters},
-      {"clusters_reused", 0},
+      {"clusters_reused", r.clusters_reused},
       {"coefficients_per_receiver", r.coefficients},
       {"rays_gather", r.rays_gather},
       {"rays_visibility", r.rays_visibility},
