@@ -4,31 +4,12 @@
 #include <array>
 #include <cmath>
 
-#include "core/base/sampling.h"
 #include "core/receivers/open_space.h"
 
 namespace lightloom {
 namespace {
 
-constexpr uint32_t kProbeRaysSide = 6;  // 36 rays decide; the first 12 do where they agree
-constexpr uint32_t kFirstRays = 12;
 constexpr int kSearchRadius = 8;  // texels
-
-enum class Space { kOpen, kSolid, kVoid };
-
-Space classify(const RayTracer& tracer, const ShadingPoint& point, uint64_t seed) {
-  constexpr uint32_t n = kProbeRaysSide * kProbeRaysSide;
-  Rng rng(hash_combine(seed, 0x51de));
-  FirstHits count;
-  for (uint32_t i = 0; i < n; ++i) {
-    // A stride coprime to n spreads the first rays over the hemisphere.
-    const Sample2 uv = stratified(i * 7 % n, kProbeRaysSide, &rng);
-    count.add(tracer.closest(point.position, leave(point, square_to_cosine_hemisphere(uv.u, uv.v))));
-    if (i + 1 == kFirstRays && (count.backs == 0 || count.backs == static_cast<int>(kFirstRays))) break;
-  }
-  if (count.solid()) return Space::kSolid;
-  return 8 * count.hits < count.rays ? Space::kVoid : Space::kOpen;
-}
 
 }  // namespace
 
