@@ -120,6 +120,12 @@ void rasterise_triangle(const LightmapUv& uv, uint32_t triangle, std::vector<Can
 
 }  // namespace
 
+float texel_size(const Object& object, const LightmapUv& uv, uint32_t triangle) {
+  const auto& c = uv.corners[triangle];
+  const double uv_area = std::abs(cross({c[0].x, c[0].y}, {c[1].x, c[1].y}, {c[2].x, c[2].y})) / 2;
+  return uv_area > 0 ? static_cast<float>(std::sqrt(world_area(object, triangle) / uv_area)) : 0;
+}
+
 Vec3 geometric_normal(const Object& object, uint32_t triangle) {
   const auto& v = object.triangles[triangle].v;
   return normalize(
@@ -207,12 +213,6 @@ Vec3 position(const Object& object, const SurfacePoint& s) {
   return interpolate(object.positions, object.triangles[s.triangle], s.b1, s.b2);
 }
 
-/// Metres per texel around a triangle.
-float texel_size(const Object& object, const std::array<Vec2, 3>& c, uint32_t triangle) {
-  const double uv_area = std::abs(cross({c[0].x, c[0].y}, {c[1].x, c[1].y}, {c[2].x, c[2].y})) / 2;
-  return uv_area > 0 ? static_cast<float>(std::sqrt(world_area(object, triangle) / uv_area)) : 0;
-}
-
 /// Cycles 3.4 jitters by uv differentials that Blender computes at half their size, and folds what leaves the triangle
 /// back by its first two barycentrics (bake_differentials in bake.c, bake_clamp_mirror_repeat in init_from_bake.h).
 SurfacePoint sample_as_cycles(const LightmapUv& uv, const Texel& texel, Sample2 jitter) {
@@ -244,7 +244,7 @@ std::optional<SurfacePoint> surface_at(const Object& object, const LightmapUv& u
     if (!barycentric(uv.corners[t], p, 0, &s.b1, &s.b2)) continue;
     if (t == texel.triangle) return s;
     // What continues the surface lies within the texel's diagonal and faces alike.
-    const float reach = 1.5f * texel_size(object, uv.corners[texel.triangle], texel.triangle);
+    const float reach = 1.5f * texel_size(object, uv, texel.triangle);
     const Vec3 centre = position(object, {texel.triangle, texel.b1, texel.b2});
     if (dot(geometric_normal(object, t), geometric_normal(object, texel.triangle)) >= 0.7071f &&
         length(position(object, s) - centre) <= reach) {

@@ -63,6 +63,9 @@ SurfacePoint sample_texel(const Object& object, const LightmapUv& uv, const Texe
                           Sample2 jitter, Footprint footprint = Footprint::kTexel,
                           const std::function<bool(const SurfacePoint&)>& accept = nullptr);
 
+/// Metres per texel around a triangle, 0 if it has no extent in uv.
+float texel_size(const Object& object, const LightmapUv& uv, uint32_t triangle);
+
 /// Unit normal of the front side by winding.
 Vec3 geometric_normal(const Object& object, uint32_t triangle);
 
