@@ -74,7 +74,8 @@ SimdStats SimdRuntime::update(const SimdFrameOptions& options) {
     const double then = std::exchange(now, milliseconds_());
     *sum += now - then;
   };
-  s.radiosity_tiles = surface_.radiosity(*kernels_, &pool_, options.epsilon, options.epsilon_floor);
+  s.radiosity_tiles =
+      surface_.radiosity(*kernels_, &pool_, std::max(options.epsilon, kRounding), options.epsilon_floor);
   s.changed_tiles = surface_.changed_tile_count();
   lap(&s.radiosity_ms);
 
