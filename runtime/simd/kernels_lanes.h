@@ -134,6 +134,7 @@ void project(const ClusterView& cluster, const float* lambda, uint32_t lambda_st
   for (; k + kProjectRows <= cluster.rank; k += kProjectRows) {
     project_rows<kProjectRows>(cluster, lambda, lambda_stride, k, coefficients);
   }
+  for (; k + 4 <= cluster.rank; k += 4) project_rows<4>(cluster, lambda, lambda_stride, k, coefficients);
   for (; k + 2 <= cluster.rank; k += 2) project_rows<2>(cluster, lambda, lambda_stride, k, coefficients);
   for (; k < cluster.rank; ++k) project_rows<1>(cluster, lambda, lambda_stride, k, coefficients);
   for (k = 0; k < cluster.rank; ++k) {

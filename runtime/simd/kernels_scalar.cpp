@@ -1,8 +1,9 @@
-// The kernels as plain loops: what the others are compared with, and what runs on any processor.
+// The kernels as plain loops: what the others are compared with, and what runs on any processor. The inner ones have
+// fixed lengths, for compilers that know vectors.
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
-#include "core/base/half.h"
 #include "runtime/simd/kernels.h"
 
 namespace lightloom::simd {
@@ -11,6 +12,16 @@ namespace {
 constexpr float kInvPi = 0.31830988618379067f;
 constexpr float kUniformScale = 3.14159265358979324f / 65535;  // unorm16 of π
 constexpr float kInvShUniform = 0.28209479177387814f;          // √(4π) ÷ 4π
+
+constexpr uint32_t kLanes = kLambdaAlign;
+
+/// half_to_float without the branch for infinities, which do not occur in assets.
+inline float finite_half(uint16_t h) {
+  const uint32_t magnitude = h & 0x7fffu;
+  const uint32_t subnormal = std::bit_cast<uint32_t>(static_cast<float>(static_cast<int32_t>(magnitude)) * 0x1p-24f);
+  const uint32_t normal = (magnitude << 13) + 0x38000000u;
+  return std::bit_cast<float>((magnitude < 0x400u ? subnormal : normal) | static_cast<uint32_t>(h & 0x8000u) << 16);
+}
 
 bool radiosity(const RadiosityJob& job, float epsilon, float floor, float* radiosity) {
   float fresh[kTileFloats];
@@ -25,19 +36,22 @@ bool radiosity(const RadiosityJob& job, float epsilon, float floor, float* radio
 }
 
 void relight(const RelightJob& job, float* lambda) {
+  const uint32_t stride = job.lambda_stride;
+  for (uint32_t i = 0; i < kRelightColumns * stride; ++i) lambda[i] = 0;
   for (uint32_t p = 0; p < kRelightProbes; ++p) {
-    for (uint32_t c = 0; c < 3; ++c) {
-      float* const sum = lambda + (3 * p + c) * job.lambda_stride;
-      for (uint32_t j = 0; j < job.lambda_stride; ++j) sum[j] = 0;
-      if (job.elements[p] == nullptr) continue;
-      for (uint32_t r = 0; r < job.rays; ++r) {
-        const float radiance = job.radiosity[size_t{3} * job.elements[p][r] + c];
-        for (uint32_t j = 0; j < job.lambda_stride; ++j) {
-          const size_t block = j / kLambdaAlign;
-          sum[j] += job.sh[(block * job.rays + r) * kLambdaAlign + j % kLambdaAlign] * radiance;
+    if (job.elements[p] == nullptr) continue;
+    for (uint32_t j = 0; j < stride; j += kLanes) {
+      float sum[3][kLanes] = {};
+      const float* y = job.sh + size_t{j} * job.rays;
+      for (uint32_t r = 0; r < job.rays; ++r, y += kLanes) {
+        const float* const radiance = job.radiosity + size_t{3} * job.elements[p][r];
+        for (uint32_t c = 0; c < 3; ++c) {
+          for (uint32_t n = 0; n < kLanes; ++n) sum[c][n] += y[n] * radiance[c];
         }
       }
-      for (uint32_t j = 0; j < job.lambda_stride; ++j) sum[j] *= job.scale;
+      for (uint32_t c = 0; c < 3; ++c) {
+        for (uint32_t n = 0; n < kLanes; ++n) lambda[(3 * p + c) * stride + j + n] = job.scale * sum[c][n];
+      }
     }
   }
 }
@@ -51,28 +65,44 @@ void project(const ClusterView& cluster, const float* lambda, uint32_t lambda_st
     for (uint32_t i = 0; i < cluster.probe_count; ++i) mean += plane(i, c)[0];
     // Without probes there is no light.
     coefficients[c] = cluster.probe_count == 0 ? 0 : mean * (kInvShUniform / static_cast<float>(cluster.probe_count));
-    const uint16_t* weight = cluster.projection;
-    for (uint32_t k = 0; k < cluster.rank; ++k) {
-      float sum = 0;
-      for (uint32_t i = 0; i < cluster.probe_count; ++i) {
-        const float* const l = plane(i, c);
-        for (uint32_t j = 0; j < cluster.stride; ++j) sum += half_to_float(*weight++) * l[j];
+  }
+  const uint16_t* weight = cluster.projection;
+  for (uint32_t k = 0; k < cluster.rank; ++k) {
+    float sum[3][8] = {};  // the stride is a multiple of 8
+    for (uint32_t i = 0; i < cluster.probe_count; ++i) {
+      for (uint32_t j = 0; j < cluster.stride; j += 8, weight += 8) {
+        float w[8];
+        for (uint32_t n = 0; n < 8; ++n) w[n] = finite_half(weight[n]);
+        for (uint32_t c = 0; c < 3; ++c) {
+          for (uint32_t n = 0; n < 8; ++n) sum[c][n] += w[n] * plane(i, c)[j + n];
+        }
       }
-      coefficients[4 * (k + 1) + c] = sum - cluster.correction[k] * coefficients[c];
+    }
+    for (uint32_t c = 0; c < 3; ++c) {
+      float total = 0;
+      for (const float part : sum[c]) total += part;
+      coefficients[4 * (k + 1) + c] = total - cluster.correction[k] * coefficients[c];
     }
   }
 }
 
 void receive(const ClusterView& cluster, const float* coefficients, uint32_t first, uint32_t count, float* irradiance) {
-  for (uint32_t c = 0; c < 3; ++c) {
-    float* const e = irradiance + c * kReceiveBlock;
-    for (uint32_t r = 0; r < count; ++r) {
-      e[r] = kUniformScale * static_cast<float>(cluster.uniform[first + r]) * coefficients[c];
+  for (uint32_t block = 0; block < count; block += 8) {
+    float e[3][8];
+    for (uint32_t n = 0; n < 8; ++n) {
+      const float uniform = kUniformScale * static_cast<float>(cluster.uniform[first + block + n]);
+      for (uint32_t c = 0; c < 3; ++c) e[c][n] = uniform * coefficients[c];
     }
-    for (uint32_t k = 0; k < cluster.rank; ++k) {
-      const uint16_t* const column = cluster.reconstruction + size_t{k} * cluster.padded + first;
-      const float ck = coefficients[4 * (k + 1) + c];
-      for (uint32_t r = 0; r < count; ++r) e[r] += half_to_float(column[r]) * ck;
+    const uint16_t* column = cluster.reconstruction + first + block;
+    for (uint32_t k = 1; k <= cluster.rank; ++k, column += cluster.padded) {
+      float w[8];
+      for (uint32_t n = 0; n < 8; ++n) w[n] = finite_half(column[n]);
+      for (uint32_t c = 0; c < 3; ++c) {
+        for (uint32_t n = 0; n < 8; ++n) e[c][n] += w[n] * coefficients[4 * k + c];
+      }
+    }
+    for (uint32_t c = 0; c < 3; ++c) {
+      for (uint32_t n = 0; n < 8; ++n) irradiance[c * kReceiveBlock + block + n] = e[c][n];
     }
   }
 }

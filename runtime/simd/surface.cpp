@@ -102,18 +102,18 @@ uint32_t Surface::radiosity(const Kernels& kernels, WorkerPool* pool, float epsi
 
 void Surface::receive(const uint32_t* elements, uint32_t count, const float* block, bool at_once) {
   float* const shown = irradiance_.data();
+  Array<uint8_t>& tiles = at_once ? dirty_ : moving_;
+  bool any = false;
   for (uint32_t i = 0; i < count; ++i) {
     const size_t at = size_t{3} * elements[i];
     const float r = block[i], g = block[kReceiveBlock + i], b = block[2 * kReceiveBlock + i];
+    const bool differs = (shown[at] != r) | (shown[at + 1] != g) | (shown[at + 2] != b);
     if (smoothing_) target_[at] = r, target_[at + 1] = g, target_[at + 2] = b;
-    if (shown[at] == r && shown[at + 1] == g && shown[at + 2] == b) continue;
-    if (at_once) {
-      shown[at] = r, shown[at + 1] = g, shown[at + 2] = b;
-      mark(&dirty_, elements[i] / kTile, &any_dirty_);
-    } else {
-      mark(&moving_, elements[i] / kTile, &any_moving_);
-    }
+    if (at_once) shown[at] = r, shown[at + 1] = g, shown[at + 2] = b;
+    if (differs) std::atomic_ref(tiles[elements[i] / kTile]).store(1, std::memory_order_relaxed);
+    any |= differs;
   }
+  if (any) (at_once ? any_dirty_ : any_moving_).store(true, std::memory_order_relaxed);
 }
 
 void Surface::smooth(WorkerPool* pool, float share) {
