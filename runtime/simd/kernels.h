@@ -16,9 +16,11 @@ inline constexpr uint32_t kLambdaAlign = 16;
 /// Probes that are relit together, so that each Y that is loaded is used for 3 times as many columns.
 inline constexpr uint32_t kRelightProbes = 4;
 inline constexpr uint32_t kRelightColumns = 3 * kRelightProbes;
-/// Receivers of one call of Kernels::receive, at most; a multiple of every lane count.
+/// Receivers are padded to it, cluster by cluster, and their columns interleaved in runs of it.
+inline constexpr uint32_t kReceiverAlign = 16;
+/// Receivers of one call of Kernels::receive, at most.
 inline constexpr uint32_t kReceiveBlock = 256;
-/// Elements that a kernel may read (and ignore) behind arrays of halfs and of uniform.
+/// Halfs that a kernel may read (and ignore) behind those of a projection.
 inline constexpr uint32_t kOverread = 16;
 
 /// One tile, kTileFloats floats each.
@@ -42,14 +44,13 @@ struct RelightJob {
 /// Symbols as in core/asset/chunk.h.
 struct ClusterView {
   const uint16_t* projection;      ///< K × P × stride halfs
-  const uint16_t* reconstruction;  ///< K × padded halfs
-  const uint16_t* uniform;         ///< padded
+  const uint16_t* reconstruction;  ///< [r/16][k][r%16] halfs, so that all are read in one sweep
+  const uint16_t* uniform;         ///< per receiver, padded
   const float* correction;         ///< K
   const uint32_t* probes;          ///< P indices of probes
   uint32_t rank;                   ///< K
   uint32_t probe_count;            ///< P
   uint32_t stride;                 ///< sh_stride
-  uint32_t padded;                 ///< receivers rounded up to 8
 };
 
 struct Kernels {
@@ -62,7 +63,7 @@ struct Kernels {
   /// coefficients[4k + colour] = c_k, k = 0..K; `lambda` is that of all probes.
   void (*project)(const ClusterView& cluster, const float* lambda, uint32_t lambda_stride, float* coefficients);
   /// irradiance[colour·kReceiveBlock + r] = E of receiver first + r, r < count. REQUIRES: first and count multiples of
-  /// 8, count ≤ kReceiveBlock. Values behind count are undefined.
+  /// kReceiverAlign, count ≤ kReceiveBlock.
   void (*receive)(const ClusterView& cluster, const float* coefficients, uint32_t first, uint32_t count,
                   float* irradiance);
 };

@@ -11,7 +11,7 @@ constexpr uint32_t kLanes = 8;
 // 12 accumulators each, of 16 registers.
 constexpr uint32_t kProjectRows = 4;
 constexpr uint32_t kRelightSplit = 2;
-constexpr uint32_t kReceiveVectors = 4;
+constexpr uint32_t kReceiveRuns = 2;
 
 F zero() { return _mm256_setzero_ps(); }
 F broadcast(float v) { return _mm256_set1_ps(v); }

@@ -11,7 +11,7 @@ constexpr uint32_t kLanes = 16;
 // 24, 12 and 12 accumulators, of 32 registers.
 constexpr uint32_t kProjectRows = 8;
 constexpr uint32_t kRelightSplit = 1;
-constexpr uint32_t kReceiveVectors = 4;
+constexpr uint32_t kReceiveRuns = 4;
 
 F zero() { return _mm512_setzero_ps(); }
 F broadcast(float v) { return _mm512_set1_ps(v); }

@@ -6,7 +6,7 @@
 //   fma(a, b, c) = a·b + c, add, mul
 //   sum                                     of the lanes, in a fixed order
 //   differs(a, b, epsilon, floor)           whether |a − b| > epsilon · max(|b|, floor) in any lane
-//   kProjectRows, kRelightSplit, kReceiveVectors   how much fits its registers
+//   kProjectRows, kRelightSplit, kReceiveRuns   how much fits its registers
 // scalar twin: kernels_scalar.cpp.
 #pragma once
 
@@ -142,37 +142,39 @@ void project(const ClusterView& cluster, const float* lambda, uint32_t lambda_st
   }
 }
 
-/// Receivers first … first + Vectors·kLanes.
-template <uint32_t Vectors>
-void receive_vectors(const ClusterView& cluster, const float* coefficients, uint32_t first, float* irradiance) {
-  F e[Vectors][3];
-  for (uint32_t v = 0; v < Vectors; ++v) {
+/// Receivers first … first + Runs·kReceiverAlign.
+template <uint32_t Runs>
+void receive_runs(const ClusterView& cluster, const float* coefficients, uint32_t first, float* irradiance) {
+  constexpr uint32_t kVectors = Runs * kReceiverAlign / kLanes;
+  F e[kVectors][3];
+  for (uint32_t v = 0; v < kVectors; ++v) {
     const F u = mul(shorts(cluster.uniform + first + v * kLanes), broadcast(kUniformScale));
     for (uint32_t c = 0; c < 3; ++c) e[v][c] = mul(u, broadcast(coefficients[c]));
   }
-  const uint16_t* column = cluster.reconstruction + first;
-  for (uint32_t k = 0; k < cluster.rank; ++k, column += cluster.padded) {
-    const float* const ck = coefficients + 4 * (k + 1);
+  const size_t run = size_t{cluster.rank} * kReceiverAlign;
+  const uint16_t* column = cluster.reconstruction + size_t{first} * cluster.rank;
+  for (uint32_t k = 1; k <= cluster.rank; ++k, column += kReceiverAlign) {
+    const float* const ck = coefficients + 4 * k;
     const F r = broadcast(ck[0]), g = broadcast(ck[1]), b = broadcast(ck[2]);
-    for (uint32_t v = 0; v < Vectors; ++v) {
-      const F w = halfs(column + v * kLanes);
+    for (uint32_t v = 0; v < kVectors; ++v) {
+      const F w = halfs(column + v * kLanes / kReceiverAlign * run + v * kLanes % kReceiverAlign);
       e[v][0] = fma(w, r, e[v][0]);
       e[v][1] = fma(w, g, e[v][1]);
       e[v][2] = fma(w, b, e[v][2]);
     }
   }
-  for (uint32_t v = 0; v < Vectors; ++v) {
+  for (uint32_t v = 0; v < kVectors; ++v) {
     for (uint32_t c = 0; c < 3; ++c) store(irradiance + c * kReceiveBlock + v * kLanes, e[v][c]);
   }
 }
 
 void receive(const ClusterView& cluster, const float* coefficients, uint32_t first, uint32_t count, float* irradiance) {
-  constexpr uint32_t kStep = kReceiveVectors * kLanes;
+  constexpr uint32_t kStep = kReceiveRuns * kReceiverAlign;
   uint32_t r = 0;
   for (; r + kStep <= count; r += kStep) {
-    receive_vectors<kReceiveVectors>(cluster, coefficients, first + r, irradiance + r);
+    receive_runs<kReceiveRuns>(cluster, coefficients, first + r, irradiance + r);
   }
-  for (; r < count; r += kLanes) receive_vectors<1>(cluster, coefficients, first + r, irradiance + r);
+  for (; r < count; r += kReceiverAlign) receive_runs<1>(cluster, coefficients, first + r, irradiance + r);
 }
 
 }  // namespace

@@ -87,22 +87,22 @@ void project(const ClusterView& cluster, const float* lambda, uint32_t lambda_st
 }
 
 void receive(const ClusterView& cluster, const float* coefficients, uint32_t first, uint32_t count, float* irradiance) {
-  for (uint32_t block = 0; block < count; block += 8) {
-    float e[3][8];
-    for (uint32_t n = 0; n < 8; ++n) {
-      const float uniform = kUniformScale * static_cast<float>(cluster.uniform[first + block + n]);
+  for (uint32_t run = first; run < first + count; run += kReceiverAlign) {
+    float e[3][kReceiverAlign];
+    for (uint32_t n = 0; n < kReceiverAlign; ++n) {
+      const float uniform = kUniformScale * static_cast<float>(cluster.uniform[run + n]);
       for (uint32_t c = 0; c < 3; ++c) e[c][n] = uniform * coefficients[c];
     }
-    const uint16_t* column = cluster.reconstruction + first + block;
-    for (uint32_t k = 1; k <= cluster.rank; ++k, column += cluster.padded) {
-      float w[8];
-      for (uint32_t n = 0; n < 8; ++n) w[n] = finite_half(column[n]);
+    const uint16_t* column = cluster.reconstruction + size_t{run} * cluster.rank;
+    for (uint32_t k = 1; k <= cluster.rank; ++k, column += kReceiverAlign) {
+      float w[kReceiverAlign];
+      for (uint32_t n = 0; n < kReceiverAlign; ++n) w[n] = finite_half(column[n]);
       for (uint32_t c = 0; c < 3; ++c) {
-        for (uint32_t n = 0; n < 8; ++n) e[c][n] += w[n] * coefficients[4 * k + c];
+        for (uint32_t n = 0; n < kReceiverAlign; ++n) e[c][n] += w[n] * coefficients[4 * k + c];
       }
     }
     for (uint32_t c = 0; c < 3; ++c) {
-      for (uint32_t n = 0; n < 8; ++n) irradiance[c * kReceiveBlock + block + n] = e[c][n];
+      for (uint32_t n = 0; n < kReceiverAlign; ++n) irradiance[c * kReceiveBlock + run - first + n] = e[c][n];
     }
   }
 }

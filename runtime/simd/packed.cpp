@@ -16,7 +16,6 @@ ClusterView PackedCell::view(const PackedCluster& c) const {
   view.rank = c.rank;
   view.probe_count = c.probe_count;
   view.stride = stride;
-  view.padded = c.padded;
   return view;
 }
 
@@ -24,6 +23,29 @@ uint64_t PackedCell::bytes() const {
   return clusters.bytes() + projection.bytes() + reconstruction.bytes() + correction.bytes() + probes.bytes() +
          elements.bytes() + uniform.bytes() + coefficients.bytes();
 }
+
+namespace {
+
+/// In the order of their surface elements, so that E is written in one sweep too.
+void pack_receivers(const SourceCell& cell, const CellChunk::Cluster& c, const PackedCluster& to, PackedCell* packed) {
+  std::vector<uint32_t> order(c.receivers);
+  for (uint32_t r = 0; r < c.receivers; ++r) order[r] = r;
+  const uint32_t* const elements = cell.elements.data() + c.first_receiver;
+  std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return elements[a] < elements[b]; });
+
+  const size_t column = (c.receivers + 7) / 8 * size_t{8};  // of the chunk
+  uint16_t* const reconstruction = packed->reconstruction.data() + to.reconstruction;
+  for (uint32_t r = 0; r < c.receivers; ++r) {
+    packed->elements[to.first + r] = elements[order[r]];
+    packed->uniform[to.first + r] = cell.chunk.uniform[c.first_receiver + order[r]];
+    const size_t run = r / kReceiverAlign * size_t{to.rank};
+    for (size_t k = 0; k < to.rank; ++k) {
+      reconstruction[(run + k) * kReceiverAlign + r % kReceiverAlign] = c.reconstruction[k * column + order[r]];
+    }
+  }
+}
+
+}  // namespace
 
 PackedCell pack_cell(const SourceCell& cell, std::pmr::memory_resource* memory) {
   PackedCell packed;
@@ -39,33 +61,31 @@ PackedCell pack_cell(const SourceCell& cell, std::pmr::memory_resource* memory) 
     to.probe_count = static_cast<uint32_t>(c.probes.size());
     to.rank = c.rank();
     to.receivers = c.receivers;
-    to.padded = (c.receivers + 7) / 8 * 8;
+    to.padded = (c.receivers + kReceiverAlign - 1) / kReceiverAlign * kReceiverAlign;
     end.projection += c.projection.size();
-    end.reconstruction += c.reconstruction.size();
+    end.reconstruction += size_t{to.rank} * to.padded;
     end.probes += to.probe_count;
     end.correction += to.rank;
     end.coefficients += 4 * (to.rank + 1);
     end.first += to.padded;
   }
   packed.projection = Array<uint16_t>(memory, end.projection + kOverread);
-  packed.reconstruction = Array<uint16_t>(memory, end.reconstruction + kOverread);
+  packed.reconstruction = Array<uint16_t>(memory, end.reconstruction);
   packed.correction = Array<float>(memory, end.correction);
   packed.probes = Array<uint32_t>(memory, end.probes);
   packed.elements = Array<uint32_t>(memory, end.first);
-  packed.uniform = Array<uint16_t>(memory, end.first + kOverread);
+  packed.uniform = Array<uint16_t>(memory, end.first);
   packed.coefficients = Array<float>(memory, end.coefficients);
   packed.projection_bytes = end.projection * sizeof(Half);
-  packed.reconstruction_bytes = end.reconstruction * sizeof(Half);
 
   for (size_t i = 0; i < cell.chunk.clusters.size(); ++i) {
     const CellChunk::Cluster& c = cell.chunk.clusters[i];
     const PackedCluster& to = packed.clusters[i];
     std::copy(c.projection.begin(), c.projection.end(), packed.projection.data() + to.projection);
-    std::copy(c.reconstruction.begin(), c.reconstruction.end(), packed.reconstruction.data() + to.reconstruction);
+    packed.reconstruction_bytes += c.reconstruction.size() * sizeof(Half);
     std::copy(c.correction.begin(), c.correction.end(), packed.correction.data() + to.correction);
     for (size_t p = 0; p < c.probes.size(); ++p) packed.probes[to.probes + p] = cell.probes[c.probes[p]];
-    std::copy_n(cell.elements.begin() + c.first_receiver, c.receivers, packed.elements.data() + to.first);
-    std::copy_n(cell.chunk.uniform.begin() + c.first_receiver, c.receivers, packed.uniform.data() + to.first);
+    pack_receivers(cell, c, to, &packed);
   }
   return packed;
 }

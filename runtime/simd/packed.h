@@ -22,11 +22,11 @@ struct PackedCell {
   Array<uint16_t> projection, reconstruction;
   Array<float> correction;
   Array<uint32_t> probes;    ///< of the manifest
-  Array<uint32_t> elements;  ///< each cluster's padded to 8
+  Array<uint32_t> elements;  ///< each cluster's padded to kReceiverAlign, ascending
   Array<uint16_t> uniform;   ///< likewise
   Array<float> coefficients;
   uint32_t stride = 0;
-  uint64_t projection_bytes = 0, reconstruction_bytes = 0;  ///< without padding
+  uint64_t projection_bytes = 0, reconstruction_bytes = 0;  ///< in the asset
 
   ClusterView view(const PackedCluster& c) const;
   uint64_t bytes() const;
