@@ -55,9 +55,10 @@ struct ClusterView {
 
 struct Kernels {
   const char* name;
-  /// B' = albedo/π · (direct + E) + emission. If any |B' − B| > epsilon · max(|B|, floor), stores B' and returns true;
-  /// otherwise the tile keeps its B, so that small changes add up until they count.
-  bool (*radiosity)(const RadiosityJob& job, float epsilon, float floor, float* radiosity);
+  /// B' = albedo/π · (direct + E) + emission. If any |B' − B| > epsilon · max(|B|, floor), stores B' and its
+  /// greatest |value| of each colour and returns true; otherwise the tile keeps its B, so that small changes add up until
+  /// they count.
+  bool (*radiosity)(const RadiosityJob& job, float epsilon, float floor, float* radiosity, float greatest[3]);
   /// lambda[(3·probe + colour)·lambda_stride + j] = 4π/N · Σ_r Y_j(ω_r) · L_r of kRelightProbes probes.
   void (*relight)(const RelightJob& job, float* lambda);
   /// coefficients[4k + colour] = c_k, k = 0..K; `lambda` is that of all probes.

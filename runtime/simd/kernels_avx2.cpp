@@ -28,9 +28,10 @@ float sum(F v) {
   s = _mm_add_ps(s, _mm_movehl_ps(s, s));
   return _mm_cvtss_f32(_mm_add_ss(s, _mm_movehdup_ps(s)));
 }
+F max(F a, F b) { return _mm256_max_ps(a, b); }
 F magnitude(F v) { return _mm256_andnot_ps(broadcast(-0.0f), v); }
 bool differs(F a, F b, float epsilon, float floor) {
-  const F limit = mul(broadcast(epsilon), _mm256_max_ps(magnitude(b), broadcast(floor)));
+  const F limit = mul(broadcast(epsilon), max(magnitude(b), broadcast(floor)));
   return _mm256_movemask_ps(_mm256_cmp_ps(magnitude(_mm256_sub_ps(a, b)), limit, _CMP_GT_OQ)) != 0;
 }
 

@@ -24,9 +24,11 @@ F fma(F a, F b, F c) { return _mm512_fmadd_ps(a, b, c); }
 F add(F a, F b) { return _mm512_add_ps(a, b); }
 F mul(F a, F b) { return _mm512_mul_ps(a, b); }
 float sum(F v) { return _mm512_reduce_add_ps(v); }
+F max(F a, F b) { return _mm512_max_ps(a, b); }
+F magnitude(F v) { return _mm512_abs_ps(v); }
 bool differs(F a, F b, float epsilon, float floor) {
-  const F limit = mul(broadcast(epsilon), _mm512_max_ps(_mm512_abs_ps(b), broadcast(floor)));
-  return _mm512_cmp_ps_mask(_mm512_abs_ps(_mm512_sub_ps(a, b)), limit, _CMP_GT_OQ) != 0;
+  const F limit = mul(broadcast(epsilon), max(magnitude(b), broadcast(floor)));
+  return _mm512_cmp_ps_mask(magnitude(_mm512_sub_ps(a, b)), limit, _CMP_GT_OQ) != 0;
 }
 
 }  // namespace

@@ -3,7 +3,7 @@
 //   F, kLanes                               a vector of kLanes floats
 //   zero, broadcast, load, store            store and load need no alignment
 //   halfs, shorts                           kLanes halfs, or uint16_t, as floats
-//   fma(a, b, c) = a·b + c, add, mul
+//   fma(a, b, c) = a·b + c, add, mul, max, magnitude
 //   sum                                     of the lanes, in a fixed order
 //   differs(a, b, epsilon, floor)           whether |a − b| > epsilon · max(|b|, floor) in any lane
 //   kProjectRows, kRelightSplit, kReceiveRuns   how much fits its registers
@@ -23,7 +23,7 @@ constexpr float kInvShUniform = 0.28209479177387814f;          // √(4π) ÷ 4�
 /// Rays whose radiance is gathered at a time: 12 KiB, which stays in the first-level cache.
 constexpr uint32_t kRayBlock = 256;
 
-bool radiosity(const RadiosityJob& job, float epsilon, float floor, float* radiosity) {
+bool radiosity(const RadiosityJob& job, float epsilon, float floor, float* radiosity, float greatest[3]) {
   F fresh[kTileFloats / kLanes];
   bool changed = false;
   for (uint32_t v = 0; v < kTileFloats / kLanes; ++v) {
@@ -33,7 +33,16 @@ bool radiosity(const RadiosityJob& job, float epsilon, float floor, float* radio
     changed |= differs(fresh[v], load(radiosity + i), epsilon, floor);
   }
   if (!changed) return false;
-  for (uint32_t v = 0; v < kTileFloats / kLanes; ++v) store(radiosity + v * kLanes, fresh[v]);
+  // Three vectors hold whole colours.
+  F top[3] = {zero(), zero(), zero()};
+  for (uint32_t v = 0; v < kTileFloats / kLanes; ++v) {
+    store(radiosity + v * kLanes, fresh[v]);
+    top[v % 3] = max(top[v % 3], magnitude(fresh[v]));
+  }
+  float lanes[3 * kLanes];
+  for (uint32_t v = 0; v < 3; ++v) store(lanes + v * kLanes, top[v]);
+  greatest[0] = greatest[1] = greatest[2] = 0;
+  for (uint32_t i = 0; i < 3 * kLanes; ++i) greatest[i % 3] = lanes[i] > greatest[i % 3] ? lanes[i] : greatest[i % 3];
   return true;
 }
 

@@ -23,7 +23,7 @@ inline float finite_half(uint16_t h) {
   return std::bit_cast<float>((magnitude < 0x400u ? subnormal : normal) | static_cast<uint32_t>(h & 0x8000u) << 16);
 }
 
-bool radiosity(const RadiosityJob& job, float epsilon, float floor, float* radiosity) {
+bool radiosity(const RadiosityJob& job, float epsilon, float floor, float* radiosity, float greatest[3]) {
   float fresh[kTileFloats];
   bool changed = false;
   for (uint32_t i = 0; i < kTileFloats; ++i) {
@@ -31,7 +31,11 @@ bool radiosity(const RadiosityJob& job, float epsilon, float floor, float* radio
     changed |= std::abs(fresh[i] - radiosity[i]) > epsilon * std::max(std::abs(radiosity[i]), floor);
   }
   if (!changed) return false;
-  for (uint32_t i = 0; i < kTileFloats; ++i) radiosity[i] = fresh[i];
+  greatest[0] = greatest[1] = greatest[2] = 0;
+  for (uint32_t i = 0; i < kTileFloats; ++i) {
+    radiosity[i] = fresh[i];
+    greatest[i % 3] = std::max(greatest[i % 3], std::abs(fresh[i]));
+  }
   return true;
 }
 

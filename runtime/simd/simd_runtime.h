@@ -76,7 +76,7 @@ class SimdRuntime {
   void unload_probe(uint32_t probe);
 
   /// Elements first … take the values, packed linear RGB; units as in lightloom.h. What is equal to what was set
-  /// before is no change. REQUIRES: in range, finite, albedo in [0, 1].
+  /// before is no change. REQUIRES: in range, finite, albedo not negative.
   void set_direct(uint32_t first, std::span<const float> rgb) { set(simd::Surface::kDirect, first, rgb); }
   void set_albedo(uint32_t first, std::span<const float> rgb) { set(simd::Surface::kAlbedo, first, rgb); }
   void set_emission(uint32_t first, std::span<const float> rgb) { set(simd::Surface::kEmission, first, rgb); }

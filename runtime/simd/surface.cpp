@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstring>
 
+#include "core/base/sh.h"
+
 namespace lightloom::simd {
 namespace {
 
@@ -20,6 +22,7 @@ bool differs(Vec3 a, const float* b, float epsilon, float floor) {
 Surface::Surface(std::pmr::memory_resource* memory, uint32_t elements, bool smoothing)
     : elements_(elements),
       smoothing_(smoothing),
+      greatest_(memory, size_t{3} * tiles_of(elements)),
       dirty_(memory, tiles_of(elements)),
       moving_(memory, tiles_of(elements)),
       changed_tiles_(memory, tile_words(elements)) {
@@ -42,9 +45,11 @@ void Surface::set(Input input, uint32_t first, std::span<const float> rgb) {
   while (at < end) {
     const size_t tile = at / kTileFloats;
     const size_t count = std::min(end, (tile + 1) * kTileFloats) - at;
+    float values[kTileFloats];
+    for (size_t i = 0; i < count; ++i) values[i] = input == kAlbedo ? std::min(rgb[i], kMaxAlbedo) : rgb[i];
     float* const to = inputs_[input].data() + at;
-    if (std::memcmp(to, rgb.data(), count * sizeof(float)) != 0) {
-      std::memcpy(to, rgb.data(), count * sizeof(float));
+    if (std::memcmp(to, values, count * sizeof(float)) != 0) {
+      std::memcpy(to, values, count * sizeof(float));
       mark(&dirty_, static_cast<uint32_t>(tile), &any_dirty_);
     }
     rgb = rgb.subspan(count);
@@ -58,6 +63,7 @@ void Surface::reset() {
   moving_.fill(0);
   any_moving_ = false;
   radiosity_.fill(0);
+  greatest_.fill(0);
   dirty_.fill(1);
   any_dirty_ = true;
 }
@@ -76,6 +82,7 @@ uint32_t Surface::radiosity(const Kernels& kernels, WorkerPool* pool, float epsi
   changed_tile_count_.store(0, std::memory_order_relaxed);
   if (!any_dirty_.exchange(false, std::memory_order_relaxed)) {
     changed_tiles_.fill(0);
+    if (sky_changed_) find_limit();
     return 0;
   }
   std::atomic<uint32_t> looked_at{0};
@@ -91,13 +98,24 @@ uint32_t Surface::radiosity(const Kernels& kernels, WorkerPool* pool, float epsi
       const size_t at = tile * kTileFloats;
       const RadiosityJob job = {inputs_[kDirect].data() + at, inputs_[kAlbedo].data() + at,
                                 inputs_[kEmission].data() + at, irradiance_.data() + at};
-      if (kernels.radiosity(job, epsilon, floor, radiosity_.data() + at)) changed |= uint64_t{1} << (tile % 64);
+      if (kernels.radiosity(job, epsilon, floor, radiosity_.data() + at, greatest_.data() + 3 * tile))
+        changed |= uint64_t{1} << (tile % 64);
     }
     changed_tiles_[word] = changed;
     changed_tile_count_.fetch_add(static_cast<uint32_t>(std::popcount(changed)), std::memory_order_relaxed);
     looked_at.fetch_add(dirty, std::memory_order_relaxed);
   });
+  if (sky_changed_ || changed_tile_count() > 0) find_limit();
   return looked_at.load();
+}
+
+void Surface::find_limit() {
+  const float* const sky = radiosity_.data() + size_t{3} * sky_element(elements_);
+  for (size_t c = 0; c < 3; ++c) {
+    float greatest = std::abs(sky[c]);
+    for (size_t i = c; i < greatest_.size(); i += 3) greatest = std::max(greatest, greatest_[i]);
+    limit_[c] = kPi * greatest;
+  }
 }
 
 void Surface::receive(const uint32_t* elements, uint32_t count, const float* block, bool at_once) {
@@ -106,7 +124,9 @@ void Surface::receive(const uint32_t* elements, uint32_t count, const float* blo
   bool any = false;
   for (uint32_t i = 0; i < count; ++i) {
     const size_t at = size_t{3} * elements[i];
-    const float r = block[i], g = block[kReceiveBlock + i], b = block[2 * kReceiveBlock + i];
+    const float r = std::clamp(block[i], -limit_[0], limit_[0]);
+    const float g = std::clamp(block[kReceiveBlock + i], -limit_[1], limit_[1]);
+    const float b = std::clamp(block[2 * kReceiveBlock + i], -limit_[2], limit_[2]);
     const bool differs = (shown[at] != r) | (shown[at + 1] != g) | (shown[at + 2] != b);
     if (smoothing_) target_[at] = r, target_[at + 1] = g, target_[at + 2] = b;
     if (at_once) shown[at] = r, shown[at + 1] = g, shown[at + 2] = b;
@@ -146,8 +166,8 @@ bool Surface::smooth_tile(uint32_t tile, float share) {
 }
 
 uint64_t Surface::bytes() const {
-  uint64_t total = irradiance_.bytes() + target_.bytes() + radiosity_.bytes() + dirty_.bytes() + moving_.bytes() +
-                   changed_tiles_.bytes();
+  uint64_t total = irradiance_.bytes() + target_.bytes() + radiosity_.bytes() + greatest_.bytes() + dirty_.bytes() +
+                   moving_.bytes() + changed_tiles_.bytes();
   for (const Array<float>& input : inputs_) total += input.bytes();
   return total;
 }

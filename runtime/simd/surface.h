@@ -9,6 +9,9 @@
 
 namespace lightloom::simd {
 
+/// LIGHTLOOM_MAX_ALBEDO: above it albedo is taken as that, so that infinite bounces stay finite.
+inline constexpr float kMaxAlbedo = 0.99f;
+
 class Surface {
  public:
   enum Input { kDirect, kAlbedo, kEmission };
@@ -35,7 +38,8 @@ class Surface {
   /// Packed RGB by element, with dead_element and sky_element.
   const float* radiosity_values() const { return radiosity_.data(); }
 
-  /// The new E of elements[0..count); block[colour·kReceiveBlock + i]. `at_once`: E shows it; otherwise smooth() will
+  /// The new E of elements[0..count); block[colour·kReceiveBlock + i]. No |E| becomes more than π times the greatest
+  /// radiance there is, so that feedback stays bounded whatever the asset says. `at_once`: E shows it; otherwise smooth() will
   /// bring it there. Threads may write different elements at the same time.
   void receive(const uint32_t* elements, uint32_t count, const float* block, bool at_once);
   /// E goes `share` of the way to its new value wherever it is not there yet. REQUIRES: `smoothing` was asked for.
@@ -47,6 +51,7 @@ class Surface {
 
  private:
   void mark(Array<uint8_t>* tiles, uint32_t tile, std::atomic<bool>* any);
+  void find_limit();
   bool smooth_tile(uint32_t tile, float share);
 
   uint32_t elements_;
@@ -54,6 +59,8 @@ class Surface {
   Array<float> inputs_[3];
   Array<float> irradiance_, target_;  ///< target_: empty without smoothing
   Array<float> radiosity_;
+  Array<float> greatest_;  ///< per tile and colour: of |B|
+  float limit_[3] = {};    ///< of |E|
   Vec3 environment_;
   // Per tile, a byte each so that threads may set them: B must be looked at; E is not at its target.
   Array<uint8_t> dirty_, moving_;

@@ -47,27 +47,35 @@ TEST_P(EverySet, Radiosity) {
   const auto emission = random_floats(kTileFloats, 0, 5, 3), e = random_floats(kTileFloats, 0, 9, 4);
   const RadiosityJob job = {direct.data(), albedo.data(), emission.data(), e.data()};
   std::vector<float> actual(kTileFloats), expected(kTileFloats);
-  EXPECT_TRUE(set_.radiosity(job, 0, 0, actual.data()));
-  EXPECT_TRUE(kScalarKernels.radiosity(job, 0, 0, expected.data()));
+  float greatest[3], plain_greatest[3];
+  EXPECT_TRUE(set_.radiosity(job, 0, 0, actual.data(), greatest));
+  EXPECT_TRUE(kScalarKernels.radiosity(job, 0, 0, expected.data(), plain_greatest));
   expect_close(actual, expected, 20);
-  EXPECT_FALSE(set_.radiosity(job, 0, 0, actual.data())) << "nothing has changed";
+  for (uint32_t c = 0; c < 3; ++c) {
+    float most = 0;
+    for (uint32_t i = c; i < kTileFloats; i += 3) most = std::max(most, actual[i]);
+    EXPECT_EQ(greatest[c], most);
+    EXPECT_NEAR(plain_greatest[c], most, 1e-5f);
+  }
+  EXPECT_FALSE(set_.radiosity(job, 0, 0, actual.data(), greatest)) << "nothing has changed";
 }
 
 TEST_P(EverySet, RadiosityChangesCountFromEpsilonOn) {
   const std::vector<float> zero(kTileFloats), one(kTileFloats, 1);
+  float greatest[3];
   // Each value in turn changes from 1 to 1.25.
   for (uint32_t i = 0; i < kTileFloats; ++i) {
     std::vector<float> emission(kTileFloats, 1), b = one;
     emission[i] = 1.25f;
     const RadiosityJob job = {zero.data(), zero.data(), emission.data(), zero.data()};
-    EXPECT_FALSE(set_.radiosity(job, 0.25f, 0, b.data()));
+    EXPECT_FALSE(set_.radiosity(job, 0.25f, 0, b.data(), greatest));
     EXPECT_EQ(b, one);
-    EXPECT_TRUE(set_.radiosity(job, 0.2f, 0, b.data()));
+    EXPECT_TRUE(set_.radiosity(job, 0.2f, 0, b.data(), greatest));
     EXPECT_EQ(b, emission);
     // Below the floor the change is compared with epsilon · floor.
     b = one;
-    EXPECT_FALSE(set_.radiosity(job, 0.125f, 2, b.data()));
-    EXPECT_TRUE(set_.radiosity(job, 0.125f, 1.9f, b.data()));
+    EXPECT_FALSE(set_.radiosity(job, 0.125f, 2, b.data(), greatest));
+    EXPECT_TRUE(set_.radiosity(job, 0.125f, 1.9f, b.data(), greatest));
   }
 }
 

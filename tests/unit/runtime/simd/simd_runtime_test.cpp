@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <ostream>
 #include <string>
 
@@ -99,7 +101,7 @@ TEST(SimdRuntime, ThreadsDoNotChangeABit) {
   }
 }
 
-// Every element emits L and reflects a: E = πL ÷ (1 − a).
+// Every element emits L and reflects a: E = πL ÷ (1 − a). An albedo of 1 is taken as 0.99.
 TEST(SimdRuntime, FurnaceConvergesToTheGeometricSum) {
   RandomAssetOptions options;
   options.closed = true;
@@ -111,7 +113,7 @@ TEST(SimdRuntime, FurnaceConvergesToTheGeometricSum) {
   const auto runtime = testing::simd_runtime(*source);
   const size_t S = source->surface_elements();
   testing::set_light(
-      {std::vector<Vec3>(S), std::vector<Vec3>(S, {0.5f, 0.9f, 0.99f}), std::vector<Vec3>(S, {1, 1, 1}), Vec3{}},
+      {std::vector<Vec3>(S), std::vector<Vec3>(S, {0.5f, 0.9f, 1}), std::vector<Vec3>(S, {1, 1, 1}), Vec3{}},
       runtime.get());
   const double pi = 3.14159265358979323846;
   std::vector<Vec3> before(S);
@@ -128,6 +130,36 @@ TEST(SimdRuntime, FurnaceConvergesToTheGeometricSum) {
     ASSERT_NEAR(e.y, 10 * pi, 3e-3 * pi);
     ASSERT_NEAR(e.z, 100 * pi, 0.3 * pi);
   }
+}
+
+// An asset that amplifies light, as no baker writes it: B stays within L ÷ (1 − a), the sum of what was emitted.
+TEST(SimdRuntime, NoAssetMakesFeedbackDiverge) {
+  const SyntheticAsset asset = testing::random_asset({});
+  const auto source = asset.open();
+  ASSERT_TRUE(source.ok()) << source.status();
+  const auto runtime = testing::simd_runtime(*source);
+  for (uint32_t c = 0; c < source->manifest().cells.size(); ++c) {
+    SourceCell cell = *source->cell(c);
+    for (CellChunk::Cluster& cluster : cell.chunk.clusters) {
+      std::fill(cluster.reconstruction.begin(), cluster.reconstruction.end(), Half{0x7bff});  // 65504
+    }
+    runtime->unload_cell(c);
+    ASSERT_TRUE(runtime->load_cell(c, runtime->pack_cell(cell)).ok());
+  }
+  const size_t S = source->surface_elements();
+  testing::set_light(
+      {std::vector<Vec3>(S), std::vector<Vec3>(S, {0.5f, 0.9f, 0}), std::vector<Vec3>(S, {1, 1, 1}), Vec3{}},
+      runtime.get());
+  for (int i = 0; i < 300; ++i) runtime->update();
+  const float pi = 3.14159265f;
+  float most = 0;
+  for (const Vec3 e : testing::irradiance(*runtime)) {
+    ASSERT_LE(std::abs(e.x), 2 * pi * 1.0001f);
+    ASSERT_LE(std::abs(e.y), 10 * pi * 1.0001f);
+    ASSERT_LE(std::abs(e.z), pi * 1.0001f);
+    most = std::max(most, std::abs(e.y));
+  }
+  EXPECT_GT(most, 9 * pi) << "the asset does not amplify";
 }
 
 TEST(SimdRuntime, EmptyAssetIsNoError) {
