@@ -1,0 +1,171 @@
+// Silvennoinen & Lehtinen, "Real-time Global Illumination by Precomputed Local Reconstruction from Sparse Radiance
+// Probes", SIGGRAPH Asia 2017: the compressed cluster transport of Eq. 11.
+#include "runtime/simd/cells.h"
+
+#include <algorithm>
+#include <string>
+
+#include "core/base/check.h"
+
+namespace lightloom::simd {
+namespace {
+
+/// Calls body(element) for the receivers of the cell until one returns false; returns how many returned true.
+template <class Body>
+size_t each_receiver(const PackedCell& cell, size_t most, Body body) {
+  size_t n = 0;
+  for (const PackedCluster& c : cell.clusters) {
+    for (uint32_t r = 0; r < c.receivers; ++r, ++n) {
+      if (n == most || !body(cell.elements[c.first + r])) return n;
+    }
+  }
+  return n;
+}
+
+}  // namespace
+
+Cells::Cells(std::pmr::memory_resource* memory, const Manifest& manifest, uint32_t surface_elements)
+    : packed_(manifest.cells.size(), memory),
+      first_cell_(memory, manifest.probes.size() + 1),
+      missing_probes_(memory, manifest.cells.size()),
+      received_(memory, (size_t{surface_elements} + 63) / 64),
+      turns_(memory, static_cast<uint32_t>(manifest.cells.size())) {
+  // Counting sort of the (cell, probe) pairs by probe. first_cell_[p + 1] counts, then points at p's free place, which
+  // at the end is where p + 1 begins.
+  const auto each_pair = [&](auto body) {
+    for (uint32_t c = 0; c < manifest.cells.size(); ++c) {
+      const CellEntry& entry = manifest.cells[c];
+      for (uint32_t i = 0; i < entry.probes; ++i) body(c, manifest.cell_probes[entry.first_probe + i]);
+    }
+  };
+  uint64_t pairs = 0;
+  for (const CellEntry& entry : manifest.cells) pairs += entry.probes;
+  probe_cells_ = Array<uint32_t>(memory, pairs);
+  Array<uint32_t> next(memory, manifest.probes.size());
+  each_pair([&](uint32_t, uint32_t probe) { ++first_cell_[probe + 1]; });
+  for (size_t p = 0; p < manifest.probes.size(); ++p) {
+    next[p] = first_cell_[p];
+    first_cell_[p + 1] += first_cell_[p];
+  }
+  each_pair([&](uint32_t cell, uint32_t probe) { probe_cells_[next[probe]++] = cell; });
+  for (uint32_t c = 0; c < manifest.cells.size(); ++c) missing_probes_[c] = manifest.cells[c].probes;
+}
+
+bool Cells::claim(const PackedCell& cell) {
+  size_t all = 0;
+  for (const PackedCluster& c : cell.clusters) all += c.receivers;
+  const size_t claimed = each_receiver(cell, all, [&](uint32_t element) {
+    uint64_t& word = received_[element / 64];
+    const uint64_t bit = uint64_t{1} << (element % 64);
+    if ((word & bit) != 0) return false;
+    word |= bit;
+    return true;
+  });
+  if (claimed == all) return true;
+  each_receiver(cell, claimed, [&](uint32_t element) {
+    received_[element / 64] &= ~(uint64_t{1} << (element % 64));
+    return true;
+  });
+  return false;
+}
+
+void Cells::release(const PackedCell& cell) {
+  each_receiver(cell, SIZE_MAX, [&](uint32_t element) {
+    received_[element / 64] &= ~(uint64_t{1} << (element % 64));
+    return true;
+  });
+}
+
+absl::Status Cells::load(uint32_t cell, PackedCell packed) {
+  LL_CHECK(!resident(cell));
+  if (!claim(packed)) {
+    return absl::DataLossError("cell " + std::to_string(cell) +
+                               " is corrupt: a receiver occurs twice; bake again or fetch it again");
+  }
+  bytes_ += packed.bytes();
+  packed_[cell] = std::move(packed);
+  ++resident_;
+  if (active(cell)) {
+    ++active_;
+    turns_.add(cell);
+  }
+  return absl::OkStatus();
+}
+
+void Cells::unload(uint32_t cell) {
+  if (!resident(cell)) return;
+  active_ -= active(cell);
+  turns_.remove(cell);
+  release(packed_[cell]);
+  bytes_ -= packed_[cell].bytes();
+  packed_[cell] = {};
+  --resident_;
+}
+
+void Cells::probe_loaded(uint32_t probe) {
+  for (const uint32_t c : cells_of(probe)) {
+    --missing_probes_[c];
+    if (!active(c)) continue;
+    ++active_;
+    turns_.add(c);
+  }
+}
+
+void Cells::probe_unloaded(uint32_t probe) {
+  for (const uint32_t c : cells_of(probe)) {
+    active_ -= active(c);
+    turns_.remove(c);
+    ++missing_probes_[c];
+  }
+}
+
+void Cells::lambda_changed(uint32_t probe) {
+  for (const uint32_t c : cells_of(probe)) {
+    if (active(c)) turns_.add(c);
+  }
+}
+
+void Cells::reset() {
+  for (uint32_t c = 0; c < packed_.size(); ++c) {
+    if (active(c)) turns_.add(c);
+  }
+}
+
+void Cells::project(const Kernels& kernels, WorkerPool* pool, const float* lambda, uint32_t lambda_stride) {
+  pool->run(chosen_count(), [&](uint32_t i) {
+    PackedCell& cell = packed_[chosen_[i]];
+    for (const PackedCluster& c : cell.clusters) {
+      kernels.project(cell.view(c), lambda, lambda_stride, cell.coefficients.data() + c.coefficients);
+    }
+  });
+}
+
+void Cells::receive(const Kernels& kernels, WorkerPool* pool, Surface* surface, bool at_once) const {
+  pool->run(chosen_count(), [&](uint32_t i) {
+    alignas(64) float block[3 * kReceiveBlock];
+    const PackedCell& cell = packed_[chosen_[i]];
+    for (const PackedCluster& c : cell.clusters) {
+      const ClusterView view = cell.view(c);
+      for (uint32_t first = 0; first < c.receivers; first += kReceiveBlock) {
+        kernels.receive(view, cell.coefficients.data() + c.coefficients, first,
+                        std::min(kReceiveBlock, c.padded - first), block);
+        surface->receive(cell.elements.data() + c.first + first, std::min(kReceiveBlock, c.receivers - first), block,
+                         at_once);
+      }
+    }
+  });
+}
+
+uint64_t Cells::projection_bytes() const {
+  uint64_t sum = 0;
+  for (const uint32_t c : chosen_) sum += packed_[c].projection_bytes;
+  return sum;
+}
+
+uint64_t Cells::reconstruction_bytes() const {
+  uint64_t sum = 0;
+  for (const uint32_t c : chosen_) sum += packed_[c].reconstruction_bytes;
+  return sum;
+}
+
+}  // namespace lightloom::simd

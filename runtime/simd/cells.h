@@ -1,0 +1,63 @@
+// The bake cells: which are resident, which may be computed, and which wait for it.
+#pragma once
+
+#include <vector>
+
+#include "runtime/simd/surface.h"
+#include "runtime/simd/turns.h"
+
+namespace lightloom::simd {
+
+class Cells {
+ public:
+  /// No cell is resident.
+  Cells(std::pmr::memory_resource* memory, const Manifest& manifest, uint32_t surface_elements);
+
+  bool resident(uint32_t cell) const { return packed_[cell].clusters.size() != 0; }
+  uint32_t resident_count() const { return resident_; }
+  uint32_t active_count() const { return active_; }
+  uint32_t waiting() const { return turns_.waiting(); }
+
+  /// DataLoss if a receiver is that of another resident cell, or twice in this one. REQUIRES: not resident.
+  absl::Status load(uint32_t cell, PackedCell packed);
+  /// The E of its receivers stays what it was.
+  void unload(uint32_t cell);
+  /// A cell is active while it is resident with all its probes.
+  void probe_loaded(uint32_t probe);
+  void probe_unloaded(uint32_t probe);
+  void lambda_changed(uint32_t probe);
+  /// Every active cell waits.
+  void reset();
+
+  /// Chooses at most `most` (0: all) of the cells that wait, for the next project() and receive().
+  void choose(uint32_t most) { chosen_ = turns_.take(most); }
+  uint32_t chosen_count() const { return static_cast<uint32_t>(chosen_.size()); }
+  void project(const Kernels& kernels, WorkerPool* pool, const float* lambda, uint32_t lambda_stride);
+  void receive(const Kernels& kernels, WorkerPool* pool, Surface* surface, bool at_once) const;
+  /// Bytes of the matrices of the chosen cells.
+  uint64_t projection_bytes() const;
+  uint64_t reconstruction_bytes() const;
+
+  uint64_t bytes() const { return bytes_; }
+
+ private:
+  bool active(uint32_t cell) const { return resident(cell) && missing_probes_[cell] == 0; }
+  std::span<const uint32_t> cells_of(uint32_t probe) const {
+    return {probe_cells_.data() + first_cell_[probe], first_cell_[probe + 1] - first_cell_[probe]};
+  }
+  /// Sets or clears the receivers' bits; false, and nothing is set, if one is set already.
+  bool claim(const PackedCell& cell);
+  void release(const PackedCell& cell);
+
+  std::pmr::vector<PackedCell> packed_;
+  Array<uint32_t> first_cell_;  ///< per probe and one more: range of probe_cells_
+  Array<uint32_t> probe_cells_;
+  Array<uint32_t> missing_probes_;  ///< per cell: entries of its probe list that are not resident
+  Array<uint64_t> received_;        ///< bit per surface element: a receiver of a resident cell
+  Turns turns_;
+  std::span<const uint32_t> chosen_;
+  uint32_t resident_ = 0, active_ = 0;
+  uint64_t bytes_ = 0;
+};
+
+}  // namespace lightloom::simd

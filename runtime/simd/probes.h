@@ -1,0 +1,52 @@
+// The probes: what their rays hit, their radiance λ, and which of them saw a change.
+#pragma once
+
+#include <vector>
+
+#include "runtime/simd/surface.h"
+#include "runtime/simd/turns.h"
+
+namespace lightloom::simd {
+
+class Probes {
+ public:
+  /// No probe is resident; λ = 0.
+  Probes(std::pmr::memory_resource* memory, const Manifest& manifest, uint32_t surface_elements);
+
+  bool resident(uint32_t probe) const { return packed_[probe].elements.size() != 0; }
+  uint32_t resident_count() const { return resident_; }
+  uint32_t waiting() const { return turns_.waiting(); }
+  /// REQUIRES: not resident; `packed` is pack_probe's, for the manifest's number of rays.
+  void load(uint32_t probe, PackedProbe packed);
+  /// Its λ stays what it was.
+  void unload(uint32_t probe);
+  /// λ = 0, and every resident probe waits.
+  void reset();
+
+  /// Notes the probes that see what changed.
+  void select(const Surface& surface, WorkerPool* pool);
+  /// Relights at most `most` (0: all) of those that wait. Returns the probes; changed(probe) says whether the λ of one
+  /// became another. Valid until the next call.
+  std::span<const uint32_t> relight(const Kernels& kernels, WorkerPool* pool, const float* radiosity, uint32_t most);
+  bool changed(uint32_t probe) const { return flags_[probe] != 0; }
+
+  uint32_t rays() const { return rays_; }
+  /// [probe][colour][lambda_stride]
+  const float* lambda() const { return lambda_.data(); }
+  uint32_t lambda_stride() const { return lambda_stride_; }
+  uint64_t bytes() const { return bytes_; }
+
+ private:
+  void relight_group(const Kernels& kernels, const float* radiosity, std::span<const uint32_t> probes);
+
+  uint32_t rays_, lambda_stride_;
+  std::pmr::vector<PackedProbe> packed_;
+  Array<float> sh_, lambda_;
+  /// Per probe: sees a change, then λ has changed. Bytes, so that threads may write neighbours.
+  Array<uint8_t> flags_;
+  Turns turns_;
+  uint32_t resident_ = 0;
+  uint64_t bytes_ = 0;
+};
+
+}  // namespace lightloom::simd
