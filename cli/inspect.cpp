@@ -52,6 +52,10 @@ absl::StatusOr<float> write_heatmap(const Options& o, const Manifest& m) {
             std::find_if(m.objects.begin(), m.objects.end(), [&](const ObjectEntry& e) { return e.id == object.id; });
         if (entry == m.objects.end())
           return absl::DataLossError("a cell names an object that the manifest lacks; run lightloom verify");
+        if (object.width != static_cast<uint32_t>(entry->width) ||
+            object.height != static_cast<uint32_t>(entry->height)) {
+          return absl::DataLossError("a cell and the manifest differ about an object's lightmap; run lightloom verify");
+        }
         image.set_rgb(entry->x + static_cast<int>(texel.key % object.width),
                       entry->y + static_cast<int>(texel.key / object.width), colour);
       }

@@ -86,15 +86,21 @@ absl::Status validate(const Manifest& m) {
   if (m.width < 0 || m.height < 0 || m.width > 1 << 16 || m.height > 1 << 16) {
     return corrupt("the lightmap image's size is out of range");
   }
+  if (m.layout_mode > 1) return corrupt("its layout mode is unknown");
   if (!is_finite(m.bounds) && !(m.bounds.lo == Aabb{}.lo && m.bounds.hi == Aabb{}.hi))
     return corrupt("its bounds are not finite");
   for (const ObjectEntry& o : m.objects) {
     if (o.width < 0 || o.height < 0 || o.x < 0 || o.y < 0 || o.width > m.width - o.x || o.height > m.height - o.y) {
       return corrupt("object '" + printable(o.name) + "' lies outside the lightmap image");
     }
+    constexpr int32_t kLargest = 1 << 14;
+    if (o.width > kLargest || o.height > kLargest || (o.surface.size > 0 && (o.width == 0 || o.height == 0))) {
+      return corrupt("the lightmap of object '" + printable(o.name) + "' has a size that is out of range");
+    }
   }
   for (const ProbeEntry& p : m.probes) {
     if (!is_finite(p.position)) return corrupt("a probe's position is not finite");
+    if (p.slot > 8) return corrupt("a probe's slot is out of range");
   }
   uint32_t cluster = 0;
   for (const CellEntry& c : m.cells) {

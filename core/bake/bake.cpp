@@ -97,9 +97,10 @@ absl::StatusOr<BakeReport> bake(const RayTracer& tracer, const BakeParams& param
   const std::vector<uint32_t> used = used_probes(cells);
   report.probes = used.size();
   std::vector<ChunkRef> relight(used.size());
-  const ReceiverGrid grid(scene, plan.layout, plan.receivers);
+  const ReceiverSearch search(scene, plan.layout, plan.receivers);
   done = parallel_for(used.size(), control.stage("relight rays"), [&](uint64_t i) {
-    relight[i] = writer.put(encode_relight(bake_relight(tracer, plan, grid, plan.placement.probes[used[i]].position)));
+    relight[i] =
+        writer.put(encode_relight(bake_relight(tracer, plan, search, plan.placement.probes[used[i]].position)));
   });
   if (!done) return absl::CancelledError("bake cancelled; finished chunks are kept, the old manifest stays in force");
   std::vector<ChunkRef> surfaces(scene.objects.size());

@@ -24,6 +24,22 @@ absl::Status check(const BakeParams& p) {
   return absl::OkStatus();
 }
 
+/// Probe cells are counted in int32, and a level has as many as fit its bounds.
+absl::Status check_spacing(float spacing, const Aabb& bounds) {
+  constexpr double kMostCells = 4096;    // along a side of the level
+  constexpr double kFarthest = 1 << 30;  // cells from the origin
+  double side = 0, farthest = 0;
+  for (int a = 0; a < 3; ++a) {
+    side = std::max(side, static_cast<double>(bounds.hi[a]) - static_cast<double>(bounds.lo[a]));
+    farthest =
+        std::max({farthest, std::abs(static_cast<double>(bounds.lo[a])), std::abs(static_cast<double>(bounds.hi[a]))});
+  }
+  const double least = std::max(side / kMostCells, farthest / kFarthest);
+  if (spacing >= least && spacing <= 1e6f) return absl::OkStatus();
+  return absl::InvalidArgumentError("--spacing is " + std::to_string(spacing) + " m; this level takes " +
+                                    std::to_string(least) + " to 1000000 m, or leave it out");
+}
+
 /// Octree over the world: the root is the same for every level, so a leaf depends on the receivers above it only.
 class Octree {
  public:
@@ -36,7 +52,7 @@ class Octree {
 
  private:
   static constexpr int32_t kRootLevel = 20;   // cells of 2^20 m around the origin
-  static constexpr int32_t kLeafLevel = -20;  // a heap of coincident receivers stays one cell
+  static constexpr int32_t kLeafLevel = -10;  // a heap of receivers within a millimetre stays one cell
 
   void split(int32_t level, GridCell cell, std::vector<uint32_t> receivers, bool root) {
     if (receivers.empty()) return;
@@ -94,6 +110,7 @@ absl::StatusOr<Plan> make_plan(const RayTracer& tracer, const BakeParams& reques
   const int side = std::max(1, static_cast<int>(std::lround(std::sqrt(static_cast<double>(request.rays)))));
   plan.params.rays = side * side;
   if (plan.params.spacing == 0) plan.params.spacing = default_spacing(scene.bounds());
+  LL_RETURN_IF_ERROR(check_spacing(plan.params.spacing, scene.bounds()));
   LayoutOptions layout_options;
   layout_options.lightmap_size = request.lightmap_size;
   layout_options.texels_per_metre = request.texels_per_metre;

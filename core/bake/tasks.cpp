@@ -125,7 +125,7 @@ CellResult bake_cell(const RayTracer& tracer, const CellTask& task) {
   return out;
 }
 
-RelightChunk bake_relight(const RayTracer& tracer, const Plan& plan, const ReceiverGrid& receivers, Vec3 probe) {
+RelightChunk bake_relight(const RayTracer& tracer, const Plan& plan, const ReceiverSearch& receivers, Vec3 probe) {
   const Scene& scene = tracer.scene();
   const uint32_t n = static_cast<uint32_t>(plan.params.relight_rays);
   RelightChunk out;

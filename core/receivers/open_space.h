@@ -20,12 +20,13 @@ struct FirstHits {
     if (hit.back) ++backs;
     nearest = std::min(nearest, hit.t);
   }
-  bool solid() const { return hits > 0 && 2 * backs >= hits; }
+  /// Misses count as open: a canopy over open ground is no solid.
+  bool solid() const { return rays > 0 && 2 * backs >= rays; }
 };
 
 enum class Space : uint8_t {
   kOpen,
-  kSolid,  ///< at least half of the first hits are backs
+  kSolid,  ///< at least half of the rays meet a back first
   kVoid,   ///< fewer than an eighth of the rays hit anything
 };
 

@@ -39,8 +39,8 @@ struct Receivers {
   uint32_t find(uint32_t object, uint32_t key) const;
 };
 
-/// Rasterises every object's lightmap and keeps the sides in open space. A side is solid if at least half of the first
-/// hits of its rays are back faces, whatever the material says. Backs are kept of double-sided materials only, and only
+/// Rasterises every object's lightmap and keeps the sides in open space. A side is solid if at least half of its
+/// rays meet a back face first, whatever the material says. Backs are kept of double-sided materials only, and only
 /// where an eighth of the rays hit anything: a shell's outside that faces the void has nothing to gather.
 absl::StatusOr<Receivers> find_receivers(const RayTracer& tracer, const AtlasLayout& layout, const Parallel& parallel);
 

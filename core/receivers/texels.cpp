@@ -259,7 +259,7 @@ SurfacePoint sample_texel(const Object& object, const LightmapUv& uv, const Texe
   if (footprint == Footprint::kCycles) return sample_as_cycles(uv, texel, jitter);
   // Rejection over the texel's square. The first, and mostly only, point keeps the caller's stratification; the others
   // are random numbers that the jitter names: steps of fixed length would favour some of the surface.
-  constexpr int kAttempts = 64;  // a texel that is kept is covered by 1/16 or more
+  constexpr int kAttempts = 256;  // of a texel that is kept a sixteenth is covered, of that perhaps a sixteenth open
   Rng rng(static_cast<uint64_t>(std::bit_cast<uint32_t>(jitter.u)) << 32 | std::bit_cast<uint32_t>(jitter.v));
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
     const auto s = surface_at(object, uv, grid, texel, jitter);

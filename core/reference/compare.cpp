@@ -70,6 +70,10 @@ absl::StatusOr<Comparison> compare(const Image& a, const Image& b, const Compare
                                               ") is not finite");
           }
           const float w = area(a, b, i);
+          if (!(w >= 0) || !std::isfinite(w)) {
+            return absl::InvalidArgumentError("area at (" + std::to_string(x) + ", " + std::to_string(y) +
+                                              ") is not a finite number of square metres");
+          }
           block.a += va * w;
           block.b += vb * w;
           block.weight += static_cast<double>(w);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "core/receivers/texel_opening.h"
@@ -113,10 +114,11 @@ absl::StatusOr<ReferenceResult> reference_lightmap(const RayTracer& tracer, cons
     const LightmapUv& uv = layout.uv[items[i].object];
     const uint64_t key =
         hash_combine(hash_combine(object.id.low64(), static_cast<uint64_t>(texel.y) << 32 | texel.x), options.seed);
-    const TexelOpening opening(tracer, object, uv, grid, texel, /*back=*/false, key);
+    std::optional<TexelOpening> opening;  // Cycles knows of none
+    if (options.footprint == Footprint::kTexel) opening.emplace(tracer, object, uv, grid, texel, /*back=*/false, key);
     const auto point = [&](Sample2 jitter) {
       const SurfacePoint s = sample_texel(object, uv, grid, texel, jitter, options.footprint,
-                                          [&](const SurfacePoint& p) { return opening.contains(p); });
+                                          [&](const SurfacePoint& p) { return opening->contains(p); });
       return shading_point(object, s.triangle, s.b1, s.b2, false);
     };
     Rng first(hash_combine(key, 1)), second(hash_combine(key, 2));

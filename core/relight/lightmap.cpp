@@ -62,7 +62,7 @@ Image lightmap_image(const SurfaceElements& elements, std::span<const Vec3> irra
   return image;
 }
 
-Vec3 sample_irradiance(const SurfaceElements& elements, const ReceiverGrid& grid, std::span<const Vec3> irradiance,
+Vec3 sample_irradiance(const SurfaceElements& elements, const ReceiverSearch& search, std::span<const Vec3> irradiance,
                        const Hit& hit) {
   const LightmapUv& uv = elements.layout.uv[hit.object];
   if (uv.corners.empty()) return {};
@@ -83,7 +83,7 @@ Vec3 sample_irradiance(const SurfaceElements& elements, const ReceiverGrid& grid
     weight += w;
   }
   if (weight > 1e-4f) return sum / weight;
-  const uint32_t nearest = grid.locate(hit);
+  const uint32_t nearest = search.locate(hit);
   return nearest == Receivers::kNone ? Vec3{} : irradiance[nearest];
 }
 

@@ -105,6 +105,8 @@ absl::StatusOr<SurfaceInputs> light_surfaces(const RayTracer& tracer, const Surf
       if (!r.back) out.emission[i] += emission_at(scene, object, t, p.b1, p.b2) * weight;
     }
   });
+  // A sum of rounded shares of white may exceed white.
+  for (Vec3& a : out.albedo) a = {std::min(a.x, 1.0f), std::min(a.y, 1.0f), std::min(a.z, 1.0f)};
   if (!done) return absl::CancelledError("cancelled while lighting surfaces");
   return out;
 }

@@ -9,7 +9,7 @@
 #include <string>
 #include <utility>
 
-#include "core/receivers/receiver_grid.h"
+#include "core/receivers/receiver_search.h"
 #include "tests/support/test_scenes.h"
 
 namespace lightloom {
@@ -41,7 +41,7 @@ struct World {
   }
   World(const World&) = delete;
 
-  uint32_t locate(const Hit& hit) const { return ReceiverGrid(scene, layout, receivers).locate(hit); }
+  uint32_t locate(const Hit& hit) const { return ReceiverSearch(scene, layout, receivers).locate(hit); }
   uint32_t object(const std::string& name) const { return test::object_named(scene, name); }
   int count(const std::string& name, bool back) const {
     const uint32_t o = object(name);
@@ -172,6 +172,15 @@ TEST(FindReceivers, OpenPlaneKeepsItsFront) {
   EXPECT_EQ(w.count("plane", true), 0);
 }
 
+TEST(FindReceivers, GroundUnderAOneSidedCanopyIsOpen) {
+  Scene scene = test::open_plane(10, {1, 1, 1});
+  test::add_wall_object(&scene, "canopy", {-1, 2, 1}, {1, 2, 1}, {1, 2, -1}, {-1, 2, -1}, 0);  // looks up
+  test::identify(&scene);
+  const World w(std::move(scene), 2);
+  EXPECT_EQ(w.count("plane", false), 20 * 20);
+  EXPECT_EQ(w.receivers.solid_texels, 0u);
+}
+
 TEST(FindReceivers, ObjectsWithoutLightmapHaveNone) {
   Scene scene = test::room_with_crate();
   scene.objects[test::object_named(scene, "crate")].receive = Receive::kVolume;
@@ -212,7 +221,7 @@ TEST(Locate, NearestElse) {
   const uint32_t floor = w.object("floor");
   const LightmapUv& uv = w.layout.uv[floor];
   ASSERT_EQ(uv.width, 40);
-  const ReceiverGrid grid(w.scene, w.layout, w.receivers);
+  const ReceiverSearch search(w.scene, w.layout, w.receivers);
   int fallbacks = 0;
   for (uint32_t t = 0; t < 2; ++t) {
     for (float b1 = 0.01f; b1 < 1; b1 += 0.023f) {
@@ -231,7 +240,7 @@ TEST(Locate, NearestElse) {
         for (uint32_t r = w.receivers.ranges[floor].begin; r < w.receivers.ranges[floor].end; ++r) {
           best = std::min(best, distance(r));
         }
-        const uint32_t located = grid.locate(hit);
+        const uint32_t located = search.locate(hit);
         ASSERT_NE(located, Receivers::kNone) << "the crate is 15 texels wide";
         // Its own texel's, or the nearest.
         const bool own = w.receivers.all[located].key == static_cast<uint32_t>(y * 40 + x);

@@ -1,18 +1,18 @@
 // From a point that a ray hit to the receiver that stands for it.
 #pragma once
 
-#include <array>
-#include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "core/receivers/receivers.h"
 
 namespace lightloom {
 
-/// Receivers by where they lie. Keeps references to its arguments.
-class ReceiverGrid {
+/// Receivers by where they lie (a k-d tree). Keeps references to its arguments.
+class ReceiverSearch {
  public:
-  ReceiverGrid(const Scene& scene, const AtlasLayout& layout, const Receivers& receivers);
+  ReceiverSearch(const Scene& scene, const AtlasLayout& layout, const Receivers& receivers);
+  ~ReceiverSearch();
 
   /// The receiver of the texel that the hit falls in, if it looks the same way from about the same place. A texel that
   /// several small charts share has one receiver for all, and texels in solids and dark cavities have none: then the
@@ -21,18 +21,14 @@ class ReceiverGrid {
   uint32_t locate(const Hit& hit) const;
 
  private:
-  using Cell = std::array<int32_t, 3>;
-  struct Entry {
-    Cell cell;
-    uint32_t receiver;
-  };
-  Cell cell_of(Vec3 p) const;
+  struct Tree;
+  float texel_of(uint32_t object, uint32_t triangle) const;
 
   const Scene& scene_;
   const AtlasLayout& layout_;
   const Receivers& receivers_;
-  float side_ = 1;              ///< of a cell, metres
-  std::vector<Entry> entries_;  ///< by cell, then receiver
+  std::vector<float> texels_;  ///< per object: metres per texel over all of it
+  std::unique_ptr<Tree> tree_;
 };
 
 }  // namespace lightloom
