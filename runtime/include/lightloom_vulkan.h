@@ -53,19 +53,19 @@ typedef struct lightloom_vulkan_create_info {
   VkInstance instance; /* made for Vulkan 1.1 or newer */
   VkPhysicalDevice physical_device;
   VkDevice device;
-  PFN_vkGetInstanceProcAddr get_instance_proc_addr;   /* every Vulkan call goes through these two */
-  PFN_vkGetDeviceProcAddr get_device_proc_addr;       /* null: asked of the other */
-  const VkAllocationCallbacks* allocation_callbacks;  /* may be null; given to every vkCreate and vkAllocate */
-  uint32_t queue_family;                              /* on which the command buffers will run */
-  uint32_t frames_in_flight;                          /* 1..8; see lightloom_vulkan_record */
-  uint64_t byte_budget;                               /* as lightloom_create_info */
-  uint64_t page_bytes;                                /* ” */
-  uint64_t staging_bytes;                             /* ” */
-  uint32_t workgroup_size;                            /* ” */
-  uint32_t max_workgroups;                            /* ” */
-  uint32_t max_lights;       /* that a frame may have; 0: 64 */
-  uint32_t max_shadow_views; /* 0: 128 */
-  VkFormat image_format;     /* of E as an image: R16G16B16A16_SFLOAT or R32G32B32A32_SFLOAT; UNDEFINED: no image */
+  PFN_vkGetInstanceProcAddr get_instance_proc_addr;  /* every Vulkan call goes through these two */
+  PFN_vkGetDeviceProcAddr get_device_proc_addr;      /* null: asked of the other */
+  const VkAllocationCallbacks* allocation_callbacks; /* may be null; given to every vkCreate and vkAllocate */
+  uint32_t queue_family;                             /* on which the command buffers will run */
+  uint32_t frames_in_flight;                         /* 1..8; see lightloom_vulkan_record */
+  uint64_t byte_budget;                              /* as lightloom_create_info */
+  uint64_t page_bytes;                               /* as lightloom_create_info */
+  uint64_t staging_bytes;                            /* as lightloom_create_info */
+  uint32_t workgroup_size;                           /* as lightloom_create_info */
+  uint32_t max_workgroups;                           /* as lightloom_create_info */
+  uint32_t max_lights;                               /* that a frame may have; 0: 64 */
+  uint32_t max_shadow_views;                         /* 0: 128 */
+  VkFormat image_format; /* of E as an image: R16G16B16A16_SFLOAT or R32G32B32A32_SFLOAT; UNDEFINED: no image */
 } lightloom_vulkan_create_info;
 
 /* *out is null on failure. The device must outlive the runtime. */
@@ -115,9 +115,9 @@ LIGHTLOOM_API lightloom_result lightloom_vulkan_record(lightloom_runtime* runtim
 typedef struct lightloom_vulkan_outputs {
   uint32_t struct_size;
   uint32_t surface_elements;
-  VkBuffer irradiance;            /* S x 3 floats, storage and transfer source */
+  VkBuffer irradiance; /* S x 3 floats, storage and transfer source */
   VkDeviceSize irradiance_bytes;
-  VkBuffer direct;                /* S x 3 floats: what lightloom_set_direct or our direct pass wrote */
+  VkBuffer direct; /* S x 3 floats: what lightloom_set_direct or our direct pass wrote */
   /* E in the lightmap's layout, alpha 1 at valid texels and 0 at those that are filled from neighbours (two texels
    * around each chart); layer 0: fronts, layer 1: backs. Row 0 is v = 0. Always in VK_IMAGE_LAYOUT_GENERAL once a
    * frame is recorded. Null without image_format. */
@@ -134,9 +134,9 @@ LIGHTLOOM_API lightloom_result lightloom_vulkan_get_outputs(lightloom_runtime* r
 
 typedef struct lightloom_vulkan_device_info {
   uint32_t struct_size;
-  uint32_t flags;               /* LIGHTLOOM_CREATE_VALIDATION, LIGHTLOOM_CREATE_GPU_ASSISTED */
-  uint32_t queue_flags;         /* VkQueueFlags that the queue must have besides compute, such as VK_QUEUE_GRAPHICS_BIT */
-  uint32_t reserved;            /* 0 */
+  uint32_t flags;       /* LIGHTLOOM_CREATE_VALIDATION, LIGHTLOOM_CREATE_GPU_ASSISTED */
+  uint32_t queue_flags; /* VkQueueFlags that the queue must have besides compute, such as VK_QUEUE_GRAPHICS_BIT */
+  uint32_t reserved;    /* 0 */
   lightloom_message_fn message; /* hears errors and validation; may be null */
   void* message_user;
 } lightloom_vulkan_device_info;
