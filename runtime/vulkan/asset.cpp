@@ -222,7 +222,7 @@ absl::Status VulkanAsset::load_cell(uint32_t cell, CellChunk chunk) {
   const absl::Status marked = place.ok() ? mark_received(cell, source.elements) : place.status();
   if (!marked.ok()) {
     uploads_.pop_newest();
-    if (place.ok()) cell_pools_->release(*place);
+    if (place.ok()) cell_pools_->release(*place, recorded_ + 1);
     return marked;
   }
   uploads_.newest().to = cell_pools_->pools()[place->pool].buffer.handle();
