@@ -6,6 +6,7 @@
 #include "core/base/hash.h"
 #include "core/base/status.h"
 #include "core/base/vec.h"
+#include "runtime/asset_index.h"
 #include "runtime/include/lightloom.h"
 
 namespace lightloom {
@@ -26,12 +27,9 @@ class Backend {
   virtual bool loaded() const = 0;
 
   // REQUIRES for all below: loaded().
-  /// Calls `visit` for each chunk of the manifest, surfaces first; stops at the first error.
-  virtual absl::Status for_each_chunk(absl::Status (*visit)(void* user, const Digest& digest, uint64_t size),
-                                      void* user) const = 0;
+  virtual const AssetIndex& index() const = 0;
   virtual absl::Status load_chunk(const Digest& digest, std::span<const uint8_t> bytes) = 0;
   virtual absl::Status unload_chunk(const Digest& digest) = 0;
-  virtual uint64_t surface_elements() const = 0;
   /// `rgb` is 3·count finite values for elements [first, …); they exist.
   virtual void set(SurfaceInput input, uint64_t first, std::span<const float> rgb) = 0;
   virtual void set_environment(Vec3 radiance) = 0;

@@ -18,7 +18,7 @@ absl::Status marked(absl::Status status, const char* payload) {
 
 absl::Status check_range(const void* rgb, uint64_t first, uint64_t count, const Backend& backend) {
   if (rgb == nullptr && count > 0) return absl::InvalidArgumentError("the array is null");
-  const uint64_t elements = backend.surface_elements();
+  const uint64_t elements = backend.index().surface_elements();
   if (first > elements || count > elements - first) {
     return absl::InvalidArgumentError("elements " + std::to_string(first) + " and " + std::to_string(count) +
                                       " on are set, the asset has " + std::to_string(elements));
@@ -62,14 +62,21 @@ struct Loader {
   const lightloom_asset_info* info;
   std::vector<uint8_t> bytes;
 
-  static absl::Status visit(void* user, const Digest& digest, uint64_t size) {
-    auto* self = static_cast<Loader*>(user);
-    LL_RETURN_IF_ERROR(check_chunk_size({digest, size}));
-    self->bytes.resize(size);
-    if (self->info->read_chunk(self->info->read_user, digest.bytes.data(), size, self->bytes.data()) != 0) {
-      return absl::AbortedError("chunk " + digest.hex() + " could not be read; is the asset complete?");
+  absl::Status load(const ChunkRef& ref) {
+    if (ref.size == 0) return absl::OkStatus();
+    LL_RETURN_IF_ERROR(check_chunk_size(ref));
+    bytes.resize(ref.size);
+    if (info->read_chunk(info->read_user, ref.digest.bytes.data(), ref.size, bytes.data()) != 0) {
+      return absl::AbortedError("chunk " + ref.digest.hex() + " could not be read; is the asset complete?");
     }
-    return self->backend->load_chunk(digest, self->bytes);
+    return backend->load_chunk(ref.digest, bytes);
+  }
+  absl::Status load_all() {
+    const AssetIndex& index = backend->index();
+    for (const auto& o : index.objects()) LL_RETURN_IF_ERROR(load(o.surface));
+    for (const auto& p : index.probes()) LL_RETURN_IF_ERROR(load(p.relight));
+    for (const auto& c : index.cells()) LL_RETURN_IF_ERROR(load(c.chunk));
+    return absl::OkStatus();
   }
 };
 
@@ -202,7 +209,7 @@ lightloom_result lightloom_load(lightloom_runtime* runtime, const lightloom_asse
     lightloom::Loader loader{&backend, info, {}};
     absl::Status status;
     try {
-      status = backend.for_each_chunk(lightloom::Loader::visit, &loader);
+      status = loader.load_all();
     } catch (...) {
       backend.unload();
       throw;
@@ -269,7 +276,7 @@ lightloom_result lightloom_update(lightloom_runtime* runtime, uint32_t frames) {
 
 lightloom_result lightloom_read_irradiance(lightloom_runtime* runtime, float* rgb, uint64_t elements) {
   return with_asset(runtime, [&](Backend& backend) -> absl::Status {
-    if (elements != backend.surface_elements() || (rgb == nullptr && elements > 0)) {
+    if (elements != backend.index().surface_elements() || (rgb == nullptr && elements > 0)) {
       return absl::InvalidArgumentError("the array is null or has another length than the surface elements");
     }
     return backend.read_irradiance({rgb, elements * 3});

@@ -2,6 +2,7 @@
 #include "runtime/include/lightloom_vulkan.h"
 
 #include "runtime/boundary.h"
+#include "runtime/simd_backend.h"
 #include "runtime/vulkan/backend.h"
 
 namespace lightloom {
@@ -41,6 +42,20 @@ lightloom_result with_vulkan_asset(lightloom_runtime* runtime, Body body) noexce
     if (vulkan == nullptr) return absl::InvalidArgumentError("this runtime has no Vulkan device");
     return body(*vulkan);
   });
+}
+
+lightloom_result create_on_cpu(const lightloom_create_info& info, lightloom_runtime** out) {
+  return make_runtime(info.allocator, {info.message, info.message_user}, out,
+                      [&](lightloom_runtime* runtime) -> absl::Status {
+                        if ((info.flags & ~(LIGHTLOOM_CREATE_CPU | LIGHTLOOM_CREATE_SMOOTHING)) != 0 || info.reserved != 0) {
+                          return absl::InvalidArgumentError(
+                              "beside LIGHTLOOM_CREATE_CPU only LIGHTLOOM_CREATE_SMOOTHING may be set, and reserved must be 0");
+                        }
+                        runtime->backend = std::make_unique<SimdBackend>(
+                            SimdBackend::Options{info.threads, (info.flags & LIGHTLOOM_CREATE_SMOOTHING) != 0, info.byte_budget},
+                            &runtime->memory);
+                        return absl::OkStatus();
+                      });
 }
 
 }  // namespace
@@ -90,6 +105,7 @@ lightloom_result lightloom_create(const lightloom_create_info* info, lightloom_r
   if (out == nullptr) return LIGHTLOOM_ERROR_INVALID_ARGUMENT;
   *out = nullptr;
   if (info == nullptr || info->struct_size < sizeof(lightloom_create_info)) return LIGHTLOOM_ERROR_INVALID_ARGUMENT;
+  if ((info->flags & LIGHTLOOM_CREATE_CPU) != 0) return lightloom::create_on_cpu(*info, out);
   constexpr uint32_t kDeviceFlags = LIGHTLOOM_CREATE_VALIDATION | LIGHTLOOM_CREATE_GPU_ASSISTED;
   lightloom_vulkan_device_info device_info{};
   device_info.struct_size = sizeof device_info;

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "runtime/boundary.h"
+#include "runtime/resident.h"
 
 namespace lightloom {
 
@@ -31,7 +32,6 @@ void SimdBackend::unload() {
   runtime_ = nullptr;
   keys_.clear();
   index_.reset();
-  frames_ = 0;
 }
 
 absl::Status SimdBackend::load_chunk(const Digest& digest, std::span<const uint8_t> bytes) {
@@ -66,7 +66,7 @@ absl::Status SimdBackend::unload_chunk(const Digest& digest) {
 
 absl::Status SimdBackend::load_surface(uint32_t object, std::span<const uint8_t> bytes) {
   LL_ASSIGN_OR_RETURN(const SurfaceChunk chunk, index_->surface(object, bytes));
-  SurfaceKeys keys = surface_keys(chunk, memory_);
+  SurfaceKeys keys = keys_of_surface(chunk, memory_);
   const std::lock_guard lock(mutex_);
   if (keys_[object] == nullptr) keys_[object] = std::move(keys);
   return absl::OkStatus();
@@ -100,7 +100,7 @@ absl::Status SimdBackend::load_cell(uint32_t cell, std::span<const uint8_t> byte
 
 absl::StatusOr<std::vector<SurfaceKeys>> SimdBackend::keys_of(std::span<const uint32_t> objects) const {
   const std::lock_guard lock(mutex_);
-  return resident_keys(*index_, objects, [&](uint32_t o) { return keys_[o]; });
+  return keys_of_objects(*index_, objects, [&](uint32_t o) { return keys_[o]; });
 }
 
 absl::Status SimdBackend::check_budget(uint64_t more) const {

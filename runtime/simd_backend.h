@@ -53,7 +53,6 @@ class SimdBackend final : public Backend {
   mutable std::mutex mutex_;  ///< guards all below, and that the budget holds
   lightloom_update_options update_options_{};
   std::vector<SurfaceKeys> keys_;  ///< per object; null: not resident
-  uint64_t frames_ = 0;
 };
 
 }  // namespace lightloom

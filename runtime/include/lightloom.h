@@ -79,12 +79,13 @@ typedef struct lightloom_allocator {
   void (*release)(void* user, void* memory, size_t size, size_t alignment);
 } lightloom_allocator;
 
-/* ---- A runtime with a device of its own: tools, servers, tests ------------------------------------------- */
+/* ---- A runtime on its own: tools, servers, tests, machines without a device ------------------------------------------- */
 
 enum {
   LIGHTLOOM_CREATE_VALIDATION = 1u << 0,   /* core and synchronization validation; needs the Khronos layer. Slow. */
   LIGHTLOOM_CREATE_GPU_ASSISTED = 1u << 1, /* with VALIDATION: shaders' accesses are checked too. Very slow. */
-  LIGHTLOOM_CREATE_SMOOTHING = 1u << 2     /* makes room for lightloom_update_options.smoothing < 1 */
+  LIGHTLOOM_CREATE_SMOOTHING = 1u << 2,    /* makes room for lightloom_update_options.smoothing < 1 */
+  LIGHTLOOM_CREATE_CPU = 1u << 3 /* no device: the processor's vector units; only SMOOTHING may stand beside it */
 };
 
 /* Zero all, then set struct_size to sizeof. Fields are only ever added at the end. */
@@ -94,15 +95,18 @@ typedef struct lightloom_create_info {
   lightloom_message_fn message; /* may be null */
   void* message_user;
   lightloom_allocator allocator;
-  uint64_t byte_budget;    /* device memory, bytes; 0: no limit */
+  uint64_t byte_budget;    /* of the asset, device memory or host memory with CPU; 0: no limit */
   uint64_t page_bytes;     /* largest asset buffer; 0: 64 MiB. Small values are for tests. */
   uint64_t staging_bytes;  /* of the upload buffer of one frame; 0: 8 MiB */
   uint32_t workgroup_size; /* 8, 16, 32 or 64 invocations; 0: 64 */
   uint32_t max_workgroups; /* per dispatch dimension; 0: what the device allows. For tests. */
+  uint32_t threads;        /* with CPU; 0: one per hardware thread */
+  uint32_t reserved;       /* 0 */
 } lightloom_create_info;
 
 /* Makes a runtime with a Vulkan instance, device and compute queue of its own: a discrete GPU before an
- * integrated one before a software one. *out is null on failure. */
+ * integrated one before a software one; or, with LIGHTLOOM_CREATE_CPU, one without a device, which gives the same
+ * numbers. *out is null on failure. */
 LIGHTLOOM_API lightloom_result lightloom_create(const lightloom_create_info* info, lightloom_runtime** out);
 
 /* Frees everything, the asset too. No recorded command buffer may be in use any more. Null is fine. */
@@ -158,7 +162,7 @@ typedef struct lightloom_counts {
   uint32_t active_cells;  /* resident with all their probes */
   uint32_t pages;         /* device buffers that hold cells */
   uint64_t pending_bytes; /* not yet part of a recorded frame */
-  uint64_t gpu_bytes;     /* device memory that the asset takes, staging excluded */
+  uint64_t gpu_bytes;     /* device memory (CPU: host memory) that the asset takes, staging excluded */
   uint64_t byte_budget;   /* 0: no limit */
 } lightloom_counts;
 
@@ -246,7 +250,7 @@ typedef struct lightloom_stats {
   uint32_t struct_size; /* in: sizeof; the fields that fit are filled */
   uint32_t timestamps;  /* 0: the queue has none and all times are 0 */
   uint64_t frames;
-  /* GPU time stamps, milliseconds, summed over the frames: take differences. */
+  /* GPU time stamps (CPU: a clock), milliseconds, summed over the frames: take differences. */
   double upload_ms;    /* copies of inputs and chunks */
   double direct_ms;    /* our own direct light pass */
   double radiosity_ms; /* light leaving every surface element */

@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "runtime/boundary.h"
+#include "runtime/resident.h"
 
 namespace lightloom {
 namespace {
@@ -33,44 +34,42 @@ uint32_t octahedral(Vec3 n) {
 }  // namespace
 
 absl::Status VulkanAsset::load_chunk(const Digest& digest, std::span<const uint8_t> bytes) {
-  const auto target = index_.find(digest);
-  if (!target) return unknown_chunk("chunk " + digest.hex() + " is not in the manifest; was the level baked anew?");
+  LL_ASSIGN_OR_RETURN(const AssetIndex::Target target, find_chunk(index_, digest));
   {
     const std::lock_guard lock(mutex_);
-    const bool resident = target->kind == AssetIndex::Kind::kSurface   ? surfaces_[target->index].keys != nullptr
-                          : target->kind == AssetIndex::Kind::kRelight ? probes_[target->index].resident
-                                                                       : cells_[target->index].resident;
+    const bool resident = target.kind == AssetIndex::Kind::kSurface   ? surfaces_[target.index].keys != nullptr
+                          : target.kind == AssetIndex::Kind::kRelight ? probes_[target.index].resident
+                                                                       : cells_[target.index].resident;
     if (resident) return absl::OkStatus();
   }
-  switch (target->kind) {
+  switch (target.kind) {
     case AssetIndex::Kind::kSurface: {
-      LL_ASSIGN_OR_RETURN(const SurfaceChunk chunk, index_.surface(target->index, bytes));
-      return load_surface(target->index, chunk);
+      LL_ASSIGN_OR_RETURN(const SurfaceChunk chunk, index_.surface(target.index, bytes));
+      return load_surface(target.index, chunk);
     }
     case AssetIndex::Kind::kRelight: {
-      LL_ASSIGN_OR_RETURN(const RelightChunk chunk, index_.relight(target->index, bytes));
-      return load_relight(target->index, chunk);
+      LL_ASSIGN_OR_RETURN(const RelightChunk chunk, index_.relight(target.index, bytes));
+      return load_relight(target.index, chunk);
     }
     case AssetIndex::Kind::kCell:
       break;
   }
-  LL_ASSIGN_OR_RETURN(CellChunk chunk, index_.cell(target->index, bytes));
-  return load_cell(target->index, std::move(chunk));
+  LL_ASSIGN_OR_RETURN(CellChunk chunk, index_.cell(target.index, bytes));
+  return load_cell(target.index, std::move(chunk));
 }
 
 absl::Status VulkanAsset::unload_chunk(const Digest& digest) {
-  const auto target = index_.find(digest);
-  if (!target) return unknown_chunk("chunk " + digest.hex() + " is not in the manifest; was the level baked anew?");
+  LL_ASSIGN_OR_RETURN(const AssetIndex::Target target, find_chunk(index_, digest));
   const std::lock_guard lock(mutex_);
-  switch (target->kind) {
+  switch (target.kind) {
     case AssetIndex::Kind::kSurface:
-      unload_surface(target->index);
+      unload_surface(target.index);
       break;
     case AssetIndex::Kind::kRelight:
-      unload_relight(target->index);
+      unload_relight(target.index);
       break;
     case AssetIndex::Kind::kCell:
-      unload_cell(target->index);
+      unload_cell(target.index);
       break;
   }
   touch();
@@ -92,9 +91,7 @@ absl::Status VulkanAsset::load_surface(uint32_t object, const SurfaceChunk& chun
     append(&points, point, 4);
     append(&normals, &normal, 1);
   }
-  const std::pmr::polymorphic_allocator<std::pmr::vector<uint32_t>> allocator(memory_);
-  const SurfaceKeys keys =
-      std::allocate_shared<std::pmr::vector<uint32_t>>(allocator, chunk.keys.begin(), chunk.keys.end());
+  const SurfaceKeys keys = keys_of_surface(chunk, memory_);
 
   const AssetIndex::Target target{AssetIndex::Kind::kSurface, object};
   const std::lock_guard lock(mutex_);
@@ -133,17 +130,8 @@ void VulkanAsset::unload_surface(uint32_t object) {
 }
 
 absl::StatusOr<std::vector<SurfaceKeys>> VulkanAsset::keys_of(const std::vector<uint32_t>& objects) const {
-  std::vector<SurfaceKeys> keys;
   const std::lock_guard lock(mutex_);
-  for (const uint32_t o : objects) {
-    keys.push_back(surfaces_[o].keys);
-    if (index_.objects()[o].surface.size == 0) {
-      keys.back() = std::make_shared<const std::pmr::vector<uint32_t>>();
-    } else if (keys.back() == nullptr) {
-      return not_ready("the surface chunk of object " + std::to_string(o) + " is not resident; load it first");
-    }
-  }
-  return keys;
+  return keys_of_objects(index_, objects, [&](uint32_t o) { return surfaces_[o].keys; });
 }
 
 absl::Status VulkanAsset::load_relight(uint32_t probe, const RelightChunk& chunk) {
@@ -222,7 +210,7 @@ absl::Status VulkanAsset::load_cell(uint32_t cell, CellChunk chunk) {
   const absl::Status marked = place.ok() ? mark_received(cell, source.elements) : place.status();
   if (!marked.ok()) {
     uploads_.pop_newest();
-    if (place.ok()) cell_pools_->release(*place);
+    if (place.ok()) cell_pools_->release(*place, recorded_ + 1);
     return marked;
   }
   uploads_.newest().to = cell_pools_->pools()[place->pool].buffer.handle();

@@ -70,12 +70,14 @@ void VulkanAsset::bury(uint32_t frame) {
   while (!graves_.empty() && graves_.front().frame <= frame) {
     const Grave& g = graves_.front();
     if (g.is_slot) {
-      relight_pools_->release(g.slot);
+      relight_pools_->release(g.slot, frame);
     } else {
-      cell_pools_->release(g.place);
+      cell_pools_->release(g.place, frame);
     }
     graves_.pop_front();
   }
+  relight_pools_->free_retired(frame);
+  cell_pools_->free_retired(frame);
 }
 
 bool VulkanAsset::nothing_to_do(const lightloom_frame_info& info, uint32_t frame) {
@@ -256,7 +258,7 @@ void VulkanAsset::record_select_and_relight(VkCommandBuffer commands, uint32_t f
   const uint32_t slot_words = static_cast<uint32_t>(relight_pools_->slot_bytes() / 4);
   const auto pools = relight_pools_->pools();
   for (uint32_t p = 0; p < pools.size(); ++p) {
-    if (!pools[p].buffer.exists()) continue;
+    if (!pools[p].in_use()) continue;
     const gpu::MarkPush push{p * relight_pools_->pool_slots(), pools[p].slots, slot_words, index_.rays(), tile_words_};
     pipelines_->bind(commands, Pass::kMark, pools[p].mark, push);
     dispatch_indirect(commands, offsetof(gpu::Control, mark));
@@ -274,7 +276,7 @@ void VulkanAsset::record_select_and_relight(VkCommandBuffer commands, uint32_t f
   memory->time(commands, frame, Step::kSelect);
 
   for (uint32_t p = 0; p < pools.size(); ++p) {
-    if (!pools[p].buffer.exists()) continue;
+    if (!pools[p].in_use()) continue;
     const gpu::RelightPush push{settings_.environment.x,
                                 settings_.environment.y,
                                 settings_.environment.z,
@@ -304,14 +306,14 @@ void VulkanAsset::record_cells(VkCommandBuffer commands, uint32_t frame, FrameMe
   memory->time(commands, frame, Step::kSelectCells);
   const auto pools = cell_pools_->pools();
   for (uint32_t p = 0; p < pools.size(); ++p) {
-    if (!pools[p].buffer.exists()) continue;
+    if (!pools[p].in_use()) continue;
     pipelines_->bind(commands, Pass::kProject, pools[p].project, gpu::ProjectPush{stride_ / 8, p});
     dispatch_indirect(commands, offsetof(gpu::Control, project) + p * sizeof(gpu::Groups));
   }
   barrier_between(*context_, commands);
   memory->time(commands, frame, Step::kProject);
   for (uint32_t p = 0; p < pools.size(); ++p) {
-    if (!pools[p].buffer.exists()) continue;
+    if (!pools[p].in_use()) continue;
     pipelines_->bind(commands, Pass::kReceive, smooth_ ? pools[p].receive_target : pools[p].receive,
                      gpu::ReceivePush{p});
     dispatch_indirect(commands, offsetof(gpu::Control, receive) + p * sizeof(gpu::Groups));

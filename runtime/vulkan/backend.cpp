@@ -83,17 +83,6 @@ void VulkanBackend::unload() {
   stats_ = {};
 }
 
-absl::Status VulkanBackend::for_each_chunk(absl::Status (*visit)(void* user, const Digest& digest, uint64_t size),
-                                           void* user) const {
-  const AssetIndex& index = asset_->index();
-  for (const auto& o : index.objects()) {
-    if (o.surface.size != 0) LL_RETURN_IF_ERROR(visit(user, o.surface.digest, o.surface.size));
-  }
-  for (const auto& p : index.probes()) LL_RETURN_IF_ERROR(visit(user, p.relight.digest, p.relight.size));
-  for (const auto& c : index.cells()) LL_RETURN_IF_ERROR(visit(user, c.chunk.digest, c.chunk.size));
-  return absl::OkStatus();
-}
-
 absl::Status VulkanBackend::set_options(const lightloom_update_options& options) {
   if (options.smoothing < 1 && !asset_options_.smoothing) {
     return absl::InvalidArgumentError("smoothing below 1 needs LIGHTLOOM_CREATE_SMOOTHING");

@@ -21,13 +21,11 @@ class VulkanBackend final : public Backend {
   absl::Status load_manifest(std::span<const uint8_t> manifest) override;
   void unload() override;
   bool loaded() const override { return asset_ != nullptr; }
-  absl::Status for_each_chunk(absl::Status (*visit)(void* user, const Digest& digest, uint64_t size),
-                              void* user) const override;
+  const AssetIndex& index() const override { return asset_->index(); }
   absl::Status load_chunk(const Digest& digest, std::span<const uint8_t> bytes) override {
     return asset_->load_chunk(digest, bytes);
   }
   absl::Status unload_chunk(const Digest& digest) override { return asset_->unload_chunk(digest); }
-  uint64_t surface_elements() const override { return asset_->index().surface_elements(); }
   void set(SurfaceInput input, uint64_t first, std::span<const float> rgb) override { asset_->set(input, first, rgb); }
   void set_environment(Vec3 radiance) override { asset_->set_environment(radiance); }
   absl::Status set_options(const lightloom_update_options& options) override;

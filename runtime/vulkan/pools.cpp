@@ -28,12 +28,13 @@ absl::StatusOr<CellPools::Place> CellPools::allocate(uint64_t bytes) {
       continue;
     }
     if (const auto offset = pool.blocks->allocate(bytes)) {
+      pool.retired = 0;
       return Place{static_cast<uint32_t>(&pool - pools_.data()), *offset, bytes};
     }
   }
   if (unused == nullptr) {
-    return absl::UnimplementedError("more than " + std::to_string(gpu::kMaxPools) + " pages of cells are resident; " +
-                                    "unload some, or create with larger pages");
+    return not_ready(std::to_string(gpu::kMaxPools) + " pages of cells are in use; unload some, record " +
+                     "frames_in_flight more frames, or create with larger pages");
   }
   LL_RETURN_IF_ERROR(create(unused, bytes));
   return Place{static_cast<uint32_t>(unused - pools_.data()), *unused->blocks->allocate(bytes), bytes};
@@ -41,8 +42,9 @@ absl::StatusOr<CellPools::Place> CellPools::allocate(uint64_t bytes) {
 
 absl::Status CellPools::create(Pool* pool, uint64_t least) {
   // As large as the rest of the asset needs, a page, and the budget allow.
-  uint64_t bytes = total_bytes_ > pool_bytes_ ? total_bytes_ - pool_bytes_ : 0;
-  bytes = std::min(bytes, context_->page_bytes);
+  const uint64_t rest = total_bytes_ > pool_bytes_ ? total_bytes_ - pool_bytes_ : 0;
+  // Memory that waits for frames in flight can make it need more.
+  uint64_t bytes = std::min(std::max(rest, total_bytes_ / 8), context_->page_bytes);
   if (context_->budget != 0) bytes = std::min(bytes, context_->budget - std::min(context_->budget, context_->bytes));
   bytes = std::max(bytes, least) / gpu::kCellUnit * gpu::kCellUnit;
 
@@ -75,12 +77,19 @@ absl::Status CellPools::create(Pool* pool, uint64_t least) {
   return absl::OkStatus();
 }
 
-void CellPools::release(const Place& place) {
+void CellPools::release(const Place& place, uint32_t frame) {
   Pool& pool = pools_[place.pool];
   pool.blocks->release(place.offset, place.bytes);
-  if (!pool.blocks->empty()) return;
-  pool_bytes_ -= pool.buffer.size();
-  pool.buffer = Buffer();
+  if (pool.blocks->empty()) pool.retired = frame + context_->frames;
+}
+
+void CellPools::free_retired(uint32_t frame) {
+  for (Pool& pool : pools_) {
+    if (pool.retired == 0 || pool.retired > frame) continue;
+    pool_bytes_ -= pool.buffer.size();
+    pool.buffer = Buffer();
+    pool.retired = 0;
+  }
 }
 
 RelightPools::RelightPools(Context* context, DescriptorSets* sets, const PoolBindings& bindings, uint64_t slot_bytes,
@@ -101,13 +110,16 @@ absl::Status RelightPools::check() const {
 }
 
 absl::StatusOr<uint32_t> RelightPools::allocate() {
-  const uint32_t slot = free_.back();  // as many slots as probes
+  // As many slots as probes, so the rest waits for frames in flight.
+  if (free_.empty()) return not_ready("what was unloaded is still in use; record frames_in_flight more frames");
+  const uint32_t slot = free_.back();
   Pool& pool = pools_[slot / pool_slots_];
   if (!pool.buffer.exists()) {
     pool.slots = std::min(pool_slots_, slots_ - slot / pool_slots_ * pool_slots_);
     LL_RETURN_IF_ERROR(create(&pool));
   }
   ++pool.used;
+  pool.retired = 0;
   free_.pop_back();
   return slot;
 }
@@ -131,10 +143,18 @@ absl::Status RelightPools::create(Pool* pool) {
   return absl::OkStatus();
 }
 
-void RelightPools::release(uint32_t slot) {
+void RelightPools::release(uint32_t slot, uint32_t frame) {
   Pool& pool = pools_[slot / pool_slots_];
   free_.push_back(slot);
-  if (--pool.used == 0) pool.buffer = Buffer();
+  if (--pool.used == 0) pool.retired = frame + context_->frames;
+}
+
+void RelightPools::free_retired(uint32_t frame) {
+  for (Pool& pool : pools_) {
+    if (pool.retired == 0 || pool.retired > frame) continue;
+    pool.buffer = Buffer();
+    pool.retired = 0;
+  }
 }
 
 }  // namespace lightloom

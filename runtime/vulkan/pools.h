@@ -22,6 +22,8 @@ class CellPools {
   struct Pool {
     Buffer buffer;
     std::optional<BlockAllocator> blocks;
+    uint32_t retired = 0;  ///< 0, or the frame from which on it is freed; no frame uses it meanwhile
+    bool in_use() const { return buffer.exists() && retired == 0; }
     VkDescriptorSet project = VK_NULL_HANDLE, receive = VK_NULL_HANDLE, receive_target = VK_NULL_HANDLE;
   };
   struct Place {
@@ -35,7 +37,10 @@ class CellPools {
 
   /// over_budget() or Unimplemented if there is no room; then nothing has changed.
   absl::StatusOr<Place> allocate(uint64_t bytes);
-  void release(const Place& place);
+  /// REQUIRES: no frame in flight reads the place. `frame` is recorded next.
+  void release(const Place& place, uint32_t frame);
+  /// Frees pools that are empty for so long that no frame in flight binds them.
+  void free_retired(uint32_t frame);
   std::span<const Pool> pools() const { return pools_; }
   uint32_t count() const;
 
@@ -55,6 +60,8 @@ class RelightPools {
   struct Pool {
     Buffer buffer;
     uint32_t slots = 0, used = 0;
+    uint32_t retired = 0;  ///< as above
+    bool in_use() const { return buffer.exists() && retired == 0; }
     VkDescriptorSet mark = VK_NULL_HANDLE, relight = VK_NULL_HANDLE;
   };
 
@@ -68,7 +75,8 @@ class RelightPools {
   absl::Status check() const;
 
   absl::StatusOr<uint32_t> allocate();
-  void release(uint32_t slot);
+  void release(uint32_t slot, uint32_t frame);
+  void free_retired(uint32_t frame);
   VkBuffer buffer_of(uint32_t slot) const { return pools_[slot / pool_slots_].buffer.handle(); }
   uint64_t offset_of(uint32_t slot) const { return slot % pool_slots_ * slot_bytes_; }
   std::span<const Pool> pools() const { return pools_; }
