@@ -97,8 +97,9 @@ absl::StatusOr<BakeReport> bake(const RayTracer& tracer, const BakeParams& param
   const std::vector<uint32_t> used = used_probes(cells);
   report.probes = used.size();
   std::vector<ChunkRef> relight(used.size());
+  const ReceiverGrid grid(scene, plan.layout, plan.receivers);
   done = parallel_for(used.size(), control.stage("relight rays"), [&](uint64_t i) {
-    relight[i] = writer.put(encode_relight(bake_relight(tracer, plan, plan.placement.probes[used[i]].position)));
+    relight[i] = writer.put(encode_relight(bake_relight(tracer, plan, grid, plan.placement.probes[used[i]].position)));
   });
   if (!done) return absl::CancelledError("bake cancelled; finished chunks are kept, the old manifest stays in force");
   std::vector<ChunkRef> surfaces(scene.objects.size());
@@ -116,7 +117,7 @@ absl::StatusOr<BakeReport> bake(const RayTracer& tracer, const BakeParams& param
     for (const ChunkRef& ref : *refs) report.bytes_total += ref.size;
   }
   for (const ChunkRef& ref : relight) report.bytes_relight += ref.size;
-  report.bytes_total += encode_manifest(manifest).size();
+  report.bytes_total += std::filesystem::file_size(loom / "manifest");
   if (report.receivers > 0) report.coefficients /= static_cast<double>(report.receivers);
   report.seconds_total = seconds_since(start);
   return report;

@@ -125,7 +125,7 @@ CellResult bake_cell(const RayTracer& tracer, const CellTask& task) {
   return out;
 }
 
-RelightChunk bake_relight(const RayTracer& tracer, const Plan& plan, Vec3 probe) {
+RelightChunk bake_relight(const RayTracer& tracer, const Plan& plan, const ReceiverGrid& receivers, Vec3 probe) {
   const Scene& scene = tracer.scene();
   const uint32_t n = static_cast<uint32_t>(plan.params.relight_rays);
   RelightChunk out;
@@ -143,8 +143,10 @@ RelightChunk bake_relight(const RayTracer& tracer, const Plan& plan, Vec3 probe)
     }
     const Object& object = scene.objects[hit.object];
     if (hit.back && !scene.materials[object.triangles[hit.triangle].material].double_sided) continue;
-    receiver[i] = plan.receivers.locate(plan.layout, hit);
-    if (receiver[i] != Receivers::kNone) object_of.try_emplace(object.id, hit.object);
+    receiver[i] = receivers.locate(hit);
+    if (receiver[i] == Receivers::kNone) continue;
+    const uint32_t o = plan.receivers.all[receiver[i]].object;
+    object_of.try_emplace(scene.objects[o].id, o);
   }
   std::map<uint32_t, uint32_t> base_of;
   uint32_t base = 0;

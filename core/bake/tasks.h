@@ -7,6 +7,7 @@
 
 #include "core/asset/chunk.h"
 #include "core/bake/plan.h"
+#include "core/receivers/receiver_grid.h"
 #include "core/transport/gather.h"
 
 namespace lightloom {
@@ -35,7 +36,7 @@ CellTask make_cell_task(const Plan& plan, const Scene& scene, const PlannedCell&
 CellResult bake_cell(const RayTracer& tracer, const CellTask& task);
 
 /// What the probe sees along its relight rays, as texels of the plan's receivers.
-RelightChunk bake_relight(const RayTracer& tracer, const Plan& plan, Vec3 probe);
+RelightChunk bake_relight(const RayTracer& tracer, const Plan& plan, const ReceiverGrid& receivers, Vec3 probe);
 
 /// The receivers of one object.
 SurfaceChunk make_surface(const Plan& plan, const Scene& scene, uint32_t object);

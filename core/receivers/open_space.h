@@ -1,7 +1,9 @@
 // Inside or outside: do the rays that leave a point meet fronts or backs first?
 #pragma once
 
-#include "core/base/vec.h"
+#include <cstdint>
+
+#include "core/receivers/surface_point.h"
 #include "core/scene/ray_tracer.h"
 
 namespace lightloom {
@@ -20,5 +22,14 @@ struct FirstHits {
   }
   bool solid() const { return hits > 0 && 2 * backs >= hits; }
 };
+
+enum class Space : uint8_t {
+  kOpen,
+  kSolid,  ///< at least half of the first hits are backs
+  kVoid,   ///< fewer than an eighth of the rays hit anything
+};
+
+/// Decides by up to 36 cosine-weighted rays. `seed` names the point.
+Space classify(const RayTracer& tracer, const ShadingPoint& point, uint64_t seed);
 
 }  // namespace lightloom

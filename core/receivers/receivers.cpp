@@ -2,35 +2,10 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 
-#include "core/base/sampling.h"
 #include "core/receivers/open_space.h"
 
 namespace lightloom {
-namespace {
-
-constexpr uint32_t kProbeRaysSide = 6;  // 36 rays decide; the first 12 do where they agree
-constexpr uint32_t kFirstRays = 12;
-constexpr int kSearchRadius = 8;  // texels
-
-enum class Space { kOpen, kSolid, kVoid };
-
-Space classify(const RayTracer& tracer, const ShadingPoint& point, uint64_t seed) {
-  constexpr uint32_t n = kProbeRaysSide * kProbeRaysSide;
-  Rng rng(hash_combine(seed, 0x51de));
-  FirstHits count;
-  for (uint32_t i = 0; i < n; ++i) {
-    // A stride coprime to n spreads the first rays over the hemisphere.
-    const Sample2 uv = stratified(i * 7 % n, kProbeRaysSide, &rng);
-    count.add(tracer.closest(point.position, leave(point, square_to_cosine_hemisphere(uv.u, uv.v))));
-    if (i + 1 == kFirstRays && (count.backs == 0 || count.backs == static_cast<int>(kFirstRays))) break;
-  }
-  if (count.solid()) return Space::kSolid;
-  return 8 * count.hits < count.rays ? Space::kVoid : Space::kOpen;
-}
-
-}  // namespace
 
 void Receivers::retain(const std::vector<bool>& keep) {
   std::vector<Receiver> kept;
@@ -48,40 +23,6 @@ uint32_t Receivers::find(uint32_t object, uint32_t key) const {
   const auto begin = all.begin() + ranges[object].begin, end = all.begin() + ranges[object].end;
   const auto it = std::lower_bound(begin, end, key, [](const Receiver& r, uint32_t k) { return r.key < k; });
   return it != end && it->key == key ? static_cast<uint32_t>(it - all.begin()) : kNone;
-}
-
-uint32_t Receivers::locate(const AtlasLayout& layout, const Hit& hit) const {
-  const LightmapUv& uv = layout.uv[hit.object];
-  if (uv.corners.empty() || ranges[hit.object].begin == ranges[hit.object].end) return kNone;
-  const auto& c = uv.corners[hit.triangle];
-  const Vec2 p = c[0] * (1 - hit.b1 - hit.b2) + c[1] * hit.b1 + c[2] * hit.b2;
-  const int x = std::clamp(static_cast<int>(std::floor(p.x)), 0, uv.width - 1);
-  const int y = std::clamp(static_cast<int>(std::floor(p.y)), 0, uv.height - 1);
-  const auto at = [&](int xx, int yy) {
-    const int side = hit.back ? uv.height : 0;
-    return find(hit.object, static_cast<uint32_t>((side + yy) * uv.width + xx));
-  };
-  if (const uint32_t r = at(x, y); r != kNone) return r;
-
-  // Rings outwards; within reach of a ring's best, a farther ring's corner cannot be nearer than the next ring's edge.
-  uint32_t best = kNone;
-  float best_distance = std::numeric_limits<float>::infinity();
-  for (int radius = 1; radius <= kSearchRadius && static_cast<float>(radius * radius) <= 4 * best_distance; ++radius) {
-    for (int dy = -radius; dy <= radius; ++dy) {
-      const int step = std::abs(dy) == radius ? 1 : 2 * radius;
-      for (int dx = -radius; dx <= radius; dx += step) {
-        const int xx = x + dx, yy = y + dy;
-        if (xx < 0 || yy < 0 || xx >= uv.width || yy >= uv.height) continue;
-        const float ex = static_cast<float>(xx) + 0.5f - p.x, ey = static_cast<float>(yy) + 0.5f - p.y;
-        const float distance = ex * ex + ey * ey;
-        if (!(distance < best_distance)) continue;
-        if (const uint32_t r = at(xx, yy); r != kNone) best = r, best_distance = distance;
-      }
-    }
-    if (best != kNone && best_distance <= (static_cast<float>(radius) + 0.5f) * (static_cast<float>(radius) + 0.5f))
-      break;
-  }
-  return best;
 }
 
 absl::StatusOr<Receivers> find_receivers(const RayTracer& tracer, const AtlasLayout& layout, const Parallel& parallel) {

@@ -37,9 +37,6 @@ struct Receivers {
   void retain(const std::vector<bool>& keep);
   /// Index into `all`, or kNone.
   uint32_t find(uint32_t object, uint32_t key) const;
-  /// The receiver whose texel a hit falls in, or the nearest one of the same object and side within 8 texels (texels
-  /// whose point lies inside a solid are not receivers though part of them may be seen), or kNone.
-  uint32_t locate(const AtlasLayout& layout, const Hit& hit) const;
 };
 
 /// Rasterises every object's lightmap and keeps the sides in open space. A side is solid if at least half of the first

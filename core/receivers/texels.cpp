@@ -120,6 +120,12 @@ void rasterise_triangle(const LightmapUv& uv, uint32_t triangle, std::vector<Can
 
 }  // namespace
 
+float texel_size(const Object& object, const LightmapUv& uv, uint32_t triangle) {
+  const auto& c = uv.corners[triangle];
+  const double uv_area = std::abs(cross({c[0].x, c[0].y}, {c[1].x, c[1].y}, {c[2].x, c[2].y})) / 2;
+  return uv_area > 0 ? static_cast<float>(std::sqrt(world_area(object, triangle) / uv_area)) : 0;
+}
+
 Vec3 geometric_normal(const Object& object, uint32_t triangle) {
   const auto& v = object.triangles[triangle].v;
   return normalize(
@@ -207,12 +213,6 @@ Vec3 position(const Object& object, const SurfacePoint& s) {
   return interpolate(object.positions, object.triangles[s.triangle], s.b1, s.b2);
 }
 
-/// Metres per texel around a triangle.
-float texel_size(const Object& object, const std::array<Vec2, 3>& c, uint32_t triangle) {
-  const double uv_area = std::abs(cross({c[0].x, c[0].y}, {c[1].x, c[1].y}, {c[2].x, c[2].y})) / 2;
-  return uv_area > 0 ? static_cast<float>(std::sqrt(world_area(object, triangle) / uv_area)) : 0;
-}
-
 /// Cycles 3.4 jitters by uv differentials that Blender computes at half their size, and folds what leaves the triangle
 /// back by its first two barycentrics (bake_differentials in bake.c, bake_clamp_mirror_repeat in init_from_bake.h).
 SurfacePoint sample_as_cycles(const LightmapUv& uv, const Texel& texel, Sample2 jitter) {
@@ -235,33 +235,39 @@ SurfacePoint sample_as_cycles(const LightmapUv& uv, const Texel& texel, Sample2 
 
 }  // namespace
 
-SurfacePoint sample_texel(const Object& object, const LightmapUv& uv, const TexelGrid& grid, const Texel& texel,
-                          Sample2 jitter, Footprint footprint) {
-  if (footprint == Footprint::kCycles) return sample_as_cycles(uv, texel, jitter);
-  const SurfacePoint own{texel.triangle, texel.b1, texel.b2};
-  const Vec3 normal = geometric_normal(object, texel.triangle), centre = position(object, own);
-  // Other charts may share the texel: what continues the surface lies within its diagonal and faces alike.
-  const float reach = 1.5f * texel_size(object, uv.corners[texel.triangle], texel.triangle);
-  // Rejection over the texel's square. The first, and mostly only, point keeps the caller's stratification; the others
-  // are random numbers that the jitter names: steps of fixed length would favour some of the surface.
-  double x = jitter.u, y = jitter.v;
-  Rng rng(static_cast<uint64_t>(std::bit_cast<uint32_t>(jitter.u)) << 32 | std::bit_cast<uint32_t>(jitter.v));
-  for (int attempt = 0; attempt < 16; ++attempt) {
-    const Point p{texel.x + x, texel.y + y};
-    for (uint32_t f = 0; f < texel.fragments; ++f) {
-      const uint32_t t = grid.fragments[texel.first_fragment + f].triangle;
-      SurfacePoint s{t, 0, 0};
-      if (!barycentric(uv.corners[t], p, 0, &s.b1, &s.b2)) continue;
-      if (t != texel.triangle &&
-          (dot(geometric_normal(object, t), normal) < 0.7071f || length(position(object, s) - centre) > reach)) {
-        continue;
-      }
+std::optional<SurfacePoint> surface_at(const Object& object, const LightmapUv& uv, const TexelGrid& grid,
+                                       const Texel& texel, Sample2 at) {
+  const Point p{texel.x + static_cast<double>(at.u), texel.y + static_cast<double>(at.v)};
+  for (uint32_t f = 0; f < texel.fragments; ++f) {
+    const uint32_t t = grid.fragments[texel.first_fragment + f].triangle;
+    SurfacePoint s{t, 0, 0};
+    if (!barycentric(uv.corners[t], p, 0, &s.b1, &s.b2)) continue;
+    if (t == texel.triangle) return s;
+    // What continues the surface lies within the texel's diagonal and faces alike.
+    const float reach = 1.5f * texel_size(object, uv, texel.triangle);
+    const Vec3 centre = position(object, {texel.triangle, texel.b1, texel.b2});
+    if (dot(geometric_normal(object, t), geometric_normal(object, texel.triangle)) >= 0.7071f &&
+        length(position(object, s) - centre) <= reach) {
       return s;
     }
-    x = rng.next_float();
-    y = rng.next_float();
   }
-  return own;
+  return std::nullopt;
+}
+
+SurfacePoint sample_texel(const Object& object, const LightmapUv& uv, const TexelGrid& grid, const Texel& texel,
+                          Sample2 jitter, Footprint footprint, const std::function<bool(const SurfacePoint&)>& accept) {
+  if (footprint == Footprint::kCycles) return sample_as_cycles(uv, texel, jitter);
+  // Rejection over the texel's square. The first, and mostly only, point keeps the caller's stratification; the others
+  // are random numbers that the jitter names: steps of fixed length would favour some of the surface.
+  constexpr int kAttempts = 64;  // a texel that is kept is covered by 1/16 or more
+  Rng rng(static_cast<uint64_t>(std::bit_cast<uint32_t>(jitter.u)) << 32 | std::bit_cast<uint32_t>(jitter.v));
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    const auto s = surface_at(object, uv, grid, texel, jitter);
+    if (s && (!accept || accept(*s))) return *s;
+    jitter.u = rng.next_float();
+    jitter.v = rng.next_float();
+  }
+  return {texel.triangle, texel.b1, texel.b2};
 }
 
 }  // namespace lightloom

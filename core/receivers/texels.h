@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <optional>
 #include <vector>
 
 #include "core/base/sampling.h"
@@ -44,14 +46,25 @@ enum class Footprint : uint8_t {
   kCycles,  ///< as Blender Cycles 3.4 bakes: the middle half of the texel, mirrored into the triangle of its centre
 };
 
-/// A point on the surface in the texel, for a jitter uniform in the unit square: averages over many are the texel's
-/// value. REQUIRES for kCycles: the texel's centre is covered.
 struct SurfacePoint {
   uint32_t triangle = 0;
   float b1 = 0, b2 = 0;
 };
+
+/// The surface at (u, v) of the texel's unit square, if it continues the surface at the texel's point: other charts may
+/// share the texel.
+std::optional<SurfacePoint> surface_at(const Object& object, const LightmapUv& uv, const TexelGrid& grid,
+                                       const Texel& texel, Sample2 at);
+
+/// A point on the surface in the texel, for a jitter uniform in the unit square: averages over many are the texel's
+/// value. Points that `accept` says false of are drawn again. REQUIRES for kCycles, which accepts all: the texel's
+/// centre is covered.
 SurfacePoint sample_texel(const Object& object, const LightmapUv& uv, const TexelGrid& grid, const Texel& texel,
-                          Sample2 jitter, Footprint footprint = Footprint::kTexel);
+                          Sample2 jitter, Footprint footprint = Footprint::kTexel,
+                          const std::function<bool(const SurfacePoint&)>& accept = nullptr);
+
+/// Metres per texel around a triangle, 0 if it has no extent in uv.
+float texel_size(const Object& object, const LightmapUv& uv, uint32_t triangle);
 
 /// Unit normal of the front side by winding.
 Vec3 geometric_normal(const Object& object, uint32_t triangle);

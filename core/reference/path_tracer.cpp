@@ -7,6 +7,8 @@
 #include <functional>
 #include <vector>
 
+#include "core/receivers/texel_opening.h"
+
 namespace lightloom {
 namespace {
 
@@ -108,12 +110,15 @@ absl::StatusOr<ReferenceResult> reference_lightmap(const RayTracer& tracer, cons
     const Object& object = scene.objects[items[i].object];
     const TexelGrid& grid = grids[items[i].object];
     const Texel& texel = grid.texels[items[i].texel];
-    const auto point = [&](Sample2 jitter) {
-      const SurfacePoint s = sample_texel(object, layout.uv[items[i].object], grid, texel, jitter, options.footprint);
-      return shading_point(object, s.triangle, s.b1, s.b2, false);
-    };
+    const LightmapUv& uv = layout.uv[items[i].object];
     const uint64_t key =
         hash_combine(hash_combine(object.id.low64(), static_cast<uint64_t>(texel.y) << 32 | texel.x), options.seed);
+    const TexelOpening opening(tracer, object, uv, grid, texel, /*back=*/false, key);
+    const auto point = [&](Sample2 jitter) {
+      const SurfacePoint s = sample_texel(object, uv, grid, texel, jitter, options.footprint,
+                                          [&](const SurfacePoint& p) { return opening.contains(p); });
+      return shading_point(object, s.triangle, s.b1, s.b2, false);
+    };
     Rng first(hash_combine(key, 1)), second(hash_combine(key, 2));
     halves.first[i] = irradiance(tracer, point, options.bounces, options.samples / 2, &first);
     halves.second[i] = irradiance(tracer, point, options.bounces, options.samples / 2, &second);

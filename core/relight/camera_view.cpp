@@ -9,14 +9,14 @@
 namespace lightloom {
 namespace {
 
-Vec3 shade(const RayTracer& tracer, const SurfaceElements& elements, std::span<const Vec3> irradiance, const Hit& hit,
-           Layer layer) {
+Vec3 shade(const RayTracer& tracer, const SurfaceElements& elements, const ReceiverGrid& grid,
+           std::span<const Vec3> irradiance, const Hit& hit, Layer layer) {
   const Scene& scene = tracer.scene();
   const Object& object = scene.objects[hit.object];
   const Triangle& t = object.triangles[hit.triangle];
   if (hit.back && !scene.materials[t.material].double_sided) return {};
   Vec3 light;
-  if (layer != Layer::kDirect) light += sample_irradiance(elements, irradiance, hit);
+  if (layer != Layer::kDirect) light += sample_irradiance(elements, grid, irradiance, hit);
   if (layer == Layer::kE) return light / kPi;
   if (layer != Layer::kIndirect) {
     light += direct_irradiance(tracer, shading_point(object, hit.triangle, hit.b1, hit.b2, hit.back));
@@ -32,6 +32,7 @@ absl::StatusOr<Image> render_view(const RayTracer& tracer, const SurfaceElements
                                   std::span<const Vec3> irradiance, const Camera& camera, const ViewOptions& options) {
   const int height = std::max(1, static_cast<int>(std::lround(static_cast<float>(options.width) / camera.aspect)));
   Image image(options.width, height, {"R", "G", "B"});
+  const ReceiverGrid grid(tracer.scene(), elements.layout, elements.receivers);
   const uint32_t side = std::max(1u, static_cast<uint32_t>(std::sqrt(static_cast<float>(options.samples))));
   const bool done = parallel_for(static_cast<uint64_t>(height), options.parallel, [&](uint64_t row) {
     for (int x = 0; x < options.width; ++x) {
@@ -43,7 +44,7 @@ absl::StatusOr<Image> render_view(const RayTracer& tracer, const SurfaceElements
             camera_direction(camera, (static_cast<float>(x) + jitter.u) / static_cast<float>(options.width),
                              (static_cast<float>(row) + jitter.v) / static_cast<float>(height));
         const Hit hit = tracer.closest(camera.position, direction);
-        sum += hit ? shade(tracer, elements, irradiance, hit, options.layer) : tracer.scene().environment;
+        sum += hit ? shade(tracer, elements, grid, irradiance, hit, options.layer) : tracer.scene().environment;
       }
       image.set_rgb(x, static_cast<int>(row), sum / static_cast<float>(side * side));
     }

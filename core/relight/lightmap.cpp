@@ -62,7 +62,8 @@ Image lightmap_image(const SurfaceElements& elements, std::span<const Vec3> irra
   return image;
 }
 
-Vec3 sample_irradiance(const SurfaceElements& elements, std::span<const Vec3> irradiance, const Hit& hit) {
+Vec3 sample_irradiance(const SurfaceElements& elements, const ReceiverGrid& grid, std::span<const Vec3> irradiance,
+                       const Hit& hit) {
   const LightmapUv& uv = elements.layout.uv[hit.object];
   if (uv.corners.empty()) return {};
   const auto& c = uv.corners[hit.triangle];
@@ -82,7 +83,7 @@ Vec3 sample_irradiance(const SurfaceElements& elements, std::span<const Vec3> ir
     weight += w;
   }
   if (weight > 1e-4f) return sum / weight;
-  const uint32_t nearest = elements.receivers.locate(elements.layout, hit);
+  const uint32_t nearest = grid.locate(hit);
   return nearest == Receivers::kNone ? Vec3{} : irradiance[nearest];
 }
 

@@ -3,6 +3,7 @@
 
 #include <span>
 
+#include "core/receivers/receiver_grid.h"
 #include "core/relight/surface_inputs.h"
 #include "core/scene/image.h"
 
@@ -13,6 +14,8 @@ namespace lightloom {
 Image lightmap_image(const SurfaceElements& elements, std::span<const Vec3> irradiance);
 
 /// Bilinear over the receivers of the hit's object and side around it; the nearest one if there is none.
-Vec3 sample_irradiance(const SurfaceElements& elements, std::span<const Vec3> irradiance, const Hit& hit);
+/// `grid` is of the elements' receivers.
+Vec3 sample_irradiance(const SurfaceElements& elements, const ReceiverGrid& grid, std::span<const Vec3> irradiance,
+                       const Hit& hit);
 
 }  // namespace lightloom

@@ -7,6 +7,7 @@
 #include "core/asset/asset.h"
 #include "core/bake/plan.h"
 #include "core/base/sampling.h"
+#include "core/receivers/texel_opening.h"
 #include "core/reference/path_tracer.h"
 
 namespace lightloom {
@@ -90,11 +91,14 @@ absl::StatusOr<SurfaceInputs> light_surfaces(const RayTracer& tracer, const Surf
     const Receiver& r = elements.receivers.all[i];
     const Object& object = scene.objects[r.object];
     const TexelGrid& grid = elements.receivers.grids[r.object];
+    const Texel& texel = grid.texels[r.texel];
+    const LightmapUv& uv = elements.layout.uv[r.object];
+    const TexelOpening opening(tracer, object, uv, grid, texel, r.back, r.seed);
+    const auto open = [&](const SurfacePoint& p) { return opening.contains(p); };
     Rng rng(hash_combine(r.seed, 0xd12ec7));
     const float weight = 1.0f / static_cast<float>(side * side);
     for (uint32_t s = 0; s < side * side; ++s) {
-      const SurfacePoint p =
-          sample_texel(object, elements.layout.uv[r.object], grid, grid.texels[r.texel], stratified(s, side, &rng));
+      const SurfacePoint p = sample_texel(object, uv, grid, texel, stratified(s, side, &rng), Footprint::kTexel, open);
       const Triangle& t = object.triangles[p.triangle];
       out.direct[i] += direct_irradiance(tracer, shading_point(object, p.triangle, p.b1, p.b2, r.back)) * weight;
       out.albedo[i] += albedo_at(scene, object, t, p.b1, p.b2) * weight;

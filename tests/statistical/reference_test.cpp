@@ -95,6 +95,28 @@ TEST(Furnace, EachBounceAddsItsTerm) {
   }
 }
 
+// A furnace with a solid block in it, whose edges cut texels of the floor: only what lies in the open counts.
+TEST(Furnace, TexelsReachIntoASolid) {
+  Scene scene = test::furnace(0.5f, 1);
+  const uint32_t material = scene.objects[0].triangles[0].material;
+  test::add_solid_box(&scene, "block", {0.6f, 0, 0.7f}, {1.3f, 0.8f, 1.2f}, material);
+  for (Material& m : scene.materials) m.double_sided = true;  // dimmer inside the block, not absent
+  test::identify(&scene);
+  const uint32_t floor = test::object_named(scene, "floor");
+  const Traced traced = trace(scene, 4, 1, 64);
+  const double expected = kPiExact * 1.5;
+  int open = 0;
+  for (int y = 0; y < 8; ++y) {
+    for (int x = 0; x < 8; ++x) {
+      const double e = static_cast<double>(
+          traced.result.image.rgb(traced.layout.placements[floor].x + x, traced.layout.placements[floor].y + y).x);
+      open += std::abs(e - expected) < 1e-3 * expected;
+    }
+  }
+  // Of 8 × 8 texels of 0.25 m, [3, 5) × [3, 4) lie wholly under the block.
+  EXPECT_EQ(open, 62);
+}
+
 TEST(OpenPlane, SeesTheWholeSky) {
   const Scene scene = test::open_plane(4, {1, 1, 1});
   const Irradiance e = irradiance(trace(scene, 2, 4, 64), 0);

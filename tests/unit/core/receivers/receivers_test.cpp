@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "core/receivers/receiver_grid.h"
 #include "tests/support/test_scenes.h"
 
 namespace lightloom {
@@ -40,6 +41,7 @@ struct World {
   }
   World(const World&) = delete;
 
+  uint32_t locate(const Hit& hit) const { return ReceiverGrid(scene, layout, receivers).locate(hit); }
   uint32_t object(const std::string& name) const { return test::object_named(scene, name); }
   int count(const std::string& name, bool back) const {
     const uint32_t o = object(name);
@@ -178,7 +180,7 @@ TEST(FindReceivers, ObjectsWithoutLightmapHaveNone) {
   EXPECT_EQ(w.count("crate", false), 0);
   Hit hit;
   hit.object = w.object("crate");
-  EXPECT_EQ(w.receivers.locate(w.layout, hit), Receivers::kNone);
+  EXPECT_EQ(w.locate(hit), Receivers::kNone);
   EXPECT_EQ(w.receivers.find(hit.object, 0), Receivers::kNone);
 }
 
@@ -201,7 +203,7 @@ TEST(Locate, ExactWhereTheTexelIsAReceiver) {
     const Receiver& r = w.receivers.all[i];
     const Hit hit = w.tracer->closest(r.point.position + r.point.geometric * 0.01f, -r.point.geometric);
     ASSERT_TRUE(hit);
-    EXPECT_EQ(w.receivers.locate(w.layout, hit), i);
+    EXPECT_EQ(w.locate(hit), i);
   }
 }
 
@@ -210,7 +212,8 @@ TEST(Locate, NearestElse) {
   const uint32_t floor = w.object("floor");
   const LightmapUv& uv = w.layout.uv[floor];
   ASSERT_EQ(uv.width, 40);
-  int fallbacks = 0, nothing = 0;
+  const ReceiverGrid grid(w.scene, w.layout, w.receivers);
+  int fallbacks = 0;
   for (uint32_t t = 0; t < 2; ++t) {
     for (float b1 = 0.01f; b1 < 1; b1 += 0.023f) {
       for (float b2 = 0.01f; b1 + b2 < 1; b2 += 0.023f) {
@@ -222,33 +225,22 @@ TEST(Locate, NearestElse) {
         const auto& c = uv.corners[t];
         const Vec2 p = c[0] * (1 - b1 - b2) + c[1] * b1 + c[2] * b2;
         const int x = static_cast<int>(p.x), y = static_cast<int>(p.y);
-        const auto distance = [&](uint32_t receiver) {
-          const uint32_t key = w.receivers.all[receiver].key;
-          const float dx = static_cast<float>(key % 40) + 0.5f - p.x, dy = static_cast<float>(key / 40) + 0.5f - p.y;
-          return dx * dx + dy * dy;
-        };
-        // All within eight texels.
+        const Vec3 at = w.tracer->position(hit);
+        const auto distance = [&](uint32_t r) { return length(w.receivers.all[r].point.position - at); };
         float best = INFINITY;
-        for (int yy = std::max(0, y - 8); yy <= std::min(39, y + 8); ++yy) {
-          for (int xx = std::max(0, x - 8); xx <= std::min(39, x + 8); ++xx) {
-            const uint32_t r = w.receivers.find(floor, static_cast<uint32_t>(yy * 40 + xx));
-            if (r != Receivers::kNone) best = std::min(best, distance(r));
-          }
+        for (uint32_t r = w.receivers.ranges[floor].begin; r < w.receivers.ranges[floor].end; ++r) {
+          best = std::min(best, distance(r));
         }
-        const uint32_t located = w.receivers.locate(w.layout, hit);
-        if (std::isinf(best)) {
-          EXPECT_EQ(located, Receivers::kNone);
-          ++nothing;
-        } else {
-          ASSERT_NE(located, Receivers::kNone);
-          EXPECT_FLOAT_EQ(distance(located), best);
-          fallbacks += w.receivers.all[located].key != static_cast<uint32_t>(y * 40 + x);
-        }
+        const uint32_t located = grid.locate(hit);
+        ASSERT_NE(located, Receivers::kNone) << "the crate is 15 texels wide";
+        // Its own texel's, or the nearest.
+        const bool own = w.receivers.all[located].key == static_cast<uint32_t>(y * 40 + x);
+        EXPECT_TRUE(own || std::abs(distance(located) - best) < 1e-4f);
+        fallbacks += !own;
       }
     }
   }
   EXPECT_GT(fallbacks, 50);
-  EXPECT_EQ(nothing, 0) << "the crate is 15 texels wide";
 }
 
 TEST(Locate, NothingFartherThanEightTexels) {
@@ -261,7 +253,7 @@ TEST(Locate, NothingFartherThanEightTexels) {
     hit.triangle = v <= u ? 0 : 1;
     hit.b1 = v <= u ? u - v : u;
     hit.b2 = v <= u ? v : v - u;
-    return w.receivers.locate(w.layout, hit);
+    return w.locate(hit);
   };
   EXPECT_EQ(locate_at(1.77f, 1.77f), Receivers::kNone);
   EXPECT_EQ(locate_at(1.48f, 1.77f), Receivers::kNone) << "texel 29: ten from the edge";
@@ -269,13 +261,39 @@ TEST(Locate, NothingFartherThanEightTexels) {
   EXPECT_NE(locate_at(0.52f, 1.77f), Receivers::kNone);
 }
 
+TEST(Locate, NeverAnotherChartThatSharesTheTexel) {
+  // Two walls of a room, all their charts in one texel of a scene atlas: one receiver for both.
+  Scene scene = test::closed_box({2, 2, 2});
+  Object& both = scene.objects[0];
+  const Object& other = scene.objects[2];
+  const uint32_t first = static_cast<uint32_t>(both.positions.size());
+  both.positions.insert(both.positions.end(), other.positions.begin(), other.positions.end());
+  both.normals.insert(both.normals.end(), other.normals.begin(), other.normals.end());
+  both.uv0.insert(both.uv0.end(), other.uv0.begin(), other.uv0.end());
+  both.uv1.insert(both.uv1.end(), other.uv1.begin(), other.uv1.end());
+  for (Triangle t : other.triangles) {
+    for (uint32_t& v : t.v) v += first;
+    both.triangles.push_back(t);
+  }
+  scene.objects.erase(scene.objects.begin() + 2);
+  test::identify(&scene);
+  const World w(std::move(scene), 0.5f);
+  for (const Vec3 d : {Vec3{0, -1, 0}, Vec3{-1, 0.1f, 0.1f}, Vec3{1, 0.1f, 0}}) {
+    const Hit hit = w.tracer->closest({1.1f, 1.05f, 0.9f}, d);
+    ASSERT_TRUE(hit);
+    const uint32_t located = w.locate(hit);
+    if (located == Receivers::kNone) continue;
+    EXPECT_GT(dot(w.receivers.all[located].point.geometric, w.tracer->geometric_normal(hit)), 0.5f);
+  }
+}
+
 TEST(Locate, KeepsToTheSide) {
   const World w(room_with_curtain(false));
   Hit hit = w.tracer->closest({2.1f, 1.6f, 3}, {0, 0, -1});
   ASSERT_EQ(hit.object, w.object("curtain"));
-  EXPECT_NE(w.receivers.locate(w.layout, hit), Receivers::kNone);
+  EXPECT_NE(w.locate(hit), Receivers::kNone);
   hit.back = true;
-  EXPECT_EQ(w.receivers.locate(w.layout, hit), Receivers::kNone);
+  EXPECT_EQ(w.locate(hit), Receivers::kNone);
 }
 
 }  // namespace
