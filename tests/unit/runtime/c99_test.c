@@ -1,5 +1,6 @@
 /* The public header and library from C99: what a C engine would write. Called by vulkan_test.cpp. */
 #include <lightloom.h>
+#include <lightloom_vulkan.h>
 
 #include <stddef.h>
 #include <string.h>
