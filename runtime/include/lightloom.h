@@ -68,7 +68,7 @@ typedef enum lightloom_message_kind {
 } lightloom_message_kind;
 
 /* `text` is one line without newline, valid during the call. Called from within a lightloom function, on its
- * thread. */
+ * thread: from several at once if the runtime is used by several. */
 typedef void (*lightloom_message_fn)(void* user, lightloom_message_kind kind, const char* text);
 
 /* Where the runtime's host memory comes from; both null: malloc. Called from every thread that calls lightloom.
