@@ -10,9 +10,7 @@ namespace lightloom {
 
 class BlockAllocator {
  public:
-  BlockAllocator(uint64_t bytes, std::pmr::memory_resource* memory) : bytes_(bytes), free_(memory) {
-    free_.push_back({0, bytes});
-  }
+  BlockAllocator(uint64_t bytes, std::pmr::memory_resource* memory) : free_(memory) { free_.push_back({0, bytes}); }
 
   /// Offset of a range of that size, a multiple of its granule; nothing if there is none. Room for release() to
   /// work without memory is made here.
@@ -25,7 +23,6 @@ class BlockAllocator {
   struct Range {
     uint64_t offset, bytes;
   };
-  uint64_t bytes_;
   uint64_t blocks_ = 0;
   std::pmr::vector<Range> free_;  ///< by offset; no two touch
 };

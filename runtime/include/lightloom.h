@@ -9,7 +9,8 @@
  * ascending. The manifest alone fixes S. Per-element arrays are S x 3 floats, linear RGB, element after element.
  *
  * Threads: lightloom_load_chunk, lightloom_unload_chunk, lightloom_set_*, lightloom_get_* and one recording
- * thread may run at once on one runtime. create, destroy, load, load_manifest, unload must be alone on it.
+ * thread may run at once on one runtime. destroy, load, load_manifest, unload must be alone on it, with all
+ * recorded frames finished; create, update and read_irradiance count as recording.
  * Different runtimes are independent.
  *
  * No function throws or aborts on bad input: each says what went wrong by its result and one line to the message
@@ -67,7 +68,7 @@ typedef enum lightloom_message_kind {
 } lightloom_message_kind;
 
 /* `text` is one line without newline, valid during the call. Called from within a lightloom function, on its
- * thread. */
+ * thread: from several at once if the runtime is used by several. */
 typedef void (*lightloom_message_fn)(void* user, lightloom_message_kind kind, const char* text);
 
 /* Where the runtime's host memory comes from; both null: malloc. Called from every thread that calls lightloom.
@@ -123,7 +124,8 @@ LIGHTLOOM_API lightloom_result lightloom_load_manifest(lightloom_runtime* runtim
  * manifest are checked. An object's surface chunk comes before the cell and relight chunks that name the object
  * (NOT_READY). A cell takes part once the relight chunks of all its probes are resident too; until then, and after
  * it is unloaded, its E stays what it was. Uploads are part of the frames recorded next. A chunk that is resident
- * already is no error. On OVER_BUDGET nothing has changed. */
+ * already is no error. On OVER_BUDGET nothing has changed; NOT_READY also says that all memory for it is in use by
+ * frames in flight. */
 LIGHTLOOM_API lightloom_result lightloom_load_chunk(lightloom_runtime* runtime, const uint8_t digest[32],
                                                     const void* bytes, uint64_t size);
 

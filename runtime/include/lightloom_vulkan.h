@@ -10,9 +10,8 @@
 #ifndef LIGHTLOOM_VULKAN_H
 #define LIGHTLOOM_VULKAN_H
 
+#include <lightloom.h>
 #include <vulkan/vulkan_core.h>
-
-#include "lightloom.h"
 
 #ifdef __cplusplus
 extern "C" {

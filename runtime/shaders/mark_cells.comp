@@ -11,10 +11,8 @@ layout(std430, binding = 3) buffer Dirty { uint cell_dirty[]; };
 void main() {
   const uint c = invocation_index();
   if (c >= push.cells || cells[c].live == 0u || cell_dirty[c] != 0u) return;
-  for (uint i = 0; i < cells[c].probes; ++i) {
-    if (stamps[cell_probes[cells[c].first_probe + i]] == push.frame) {
-      cell_dirty[c] = 1u;
-      return;
-    }
-  }
+  const uint first = cells[c].first_probe, count = cells[c].probes;
+  uint relit = 0u;
+  for (uint i = 0; i < count; ++i) relit += stamps[cell_probes[first + i]] == push.frame ? 1u : 0u;
+  if (relit > 0u) cell_dirty[c] = 1u;
 }

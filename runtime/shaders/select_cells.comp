@@ -21,10 +21,10 @@ shared uint found, taken, next_cursor, project_quads, receive_quads;
 
 /// Not before each of its probes has been lit once.
 bool ready(uint c) {
-  for (uint i = 0; i < cells[c].probes; ++i) {
-    if (stamps[cell_probes[cells[c].first_probe + i]] == 0u) return false;
-  }
-  return true;
+  const uint first = cells[c].first_probe, count = cells[c].probes;
+  uint dark = 0u;
+  for (uint i = 0; i < count; ++i) dark += stamps[cell_probes[first + i]] == 0u ? 1u : 0u;
+  return dark == 0u;
 }
 
 /// Chooses among cells [first, last), at most kGroup of them.

@@ -72,11 +72,12 @@ class Engine {
     ASSERT_EQ(lightloom_load(runtime_, &info), LIGHTLOOM_OK) << joined(received_.errors);
   }
   void frame(const lightloom_frame_info* info = nullptr) {
-    ASSERT_TRUE(queue_->run([&](VkCommandBuffer commands) -> absl::Status {
-                       EXPECT_EQ(lightloom_vulkan_record(runtime_, commands, info), LIGHTLOOM_OK)
-                           << joined(received_.errors);
-                       return absl::OkStatus();
-                     })
+    ASSERT_TRUE(queue_
+                    ->run([&](VkCommandBuffer commands) -> absl::Status {
+                      EXPECT_EQ(lightloom_vulkan_record(runtime_, commands, info), LIGHTLOOM_OK)
+                          << joined(received_.errors);
+                      return absl::OkStatus();
+                    })
                     .ok());
   }
   lightloom_vulkan_outputs outputs() const {
@@ -89,11 +90,12 @@ class Engine {
   template <class Copy>
   std::vector<float> read(size_t count, Copy copy) {
     const Buffer host = *Buffer::create(&context_, count * sizeof(float), BufferUse::kHost);
-    EXPECT_TRUE(queue_->run([&](VkCommandBuffer commands) -> absl::Status {
-                       copy(commands, host.handle());
-                       barrier_after(context_, commands);
-                       return absl::OkStatus();
-                     })
+    EXPECT_TRUE(queue_
+                    ->run([&](VkCommandBuffer commands) -> absl::Status {
+                      copy(commands, host.handle());
+                      barrier_after(context_, commands);
+                      return absl::OkStatus();
+                    })
                     .ok());
     std::vector<float> out(count);
     std::memcpy(out.data(), host.mapped(), count * sizeof(float));
@@ -179,7 +181,15 @@ TEST(Engine, ImageShowsEAndFillsGutters) {
     VkBufferImageCopy region{};
     region.imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 2};
     region.imageExtent = {out.image_width, out.image_height, 1};
-    copy_image(commands, out.image, VK_IMAGE_LAYOUT_GENERAL, to, 1, &region);
+    auto barrier = vulkan_struct<VkImageMemoryBarrier>(VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER);
+    barrier.dstAccessMask = VK_ACCESS_TRANSFER_READ_BIT;
+    barrier.oldLayout = VK_IMAGE_LAYOUT_GENERAL;
+    barrier.newLayout = VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL;
+    barrier.image = out.image;
+    barrier.subresourceRange = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 2};
+    engine.context().vk.CmdPipelineBarrier(commands, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, VK_PIPELINE_STAGE_TRANSFER_BIT,
+                                           0, 0, nullptr, 0, nullptr, 1, &barrier);
+    copy_image(commands, out.image, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, to, 1, &region);
   });
   const std::vector<Vec3> e = engine.read_vec3(out.irradiance);
   const auto pixel = [&](size_t layer, int px, int py) {
@@ -354,10 +364,10 @@ TEST(Engine, ShadowMapsDecide) {
 
   // The sun straight down; the view looks down on x in [-1, 5], so the elements are at depth 0.5.
   lightloom_shadow_view shadow{};
-  shadow.view_projection[0] = 1.0f / 3;   // x/3 - 2/3
+  shadow.view_projection[0] = 1.0f / 3;  // x/3 - 2/3
   shadow.view_projection[12] = -2.0f / 3;
-  shadow.view_projection[9] = 1.0f / 3;   // z/3
-  shadow.view_projection[6] = -0.1f;      // depth 0.5 - y/10
+  shadow.view_projection[9] = 1.0f / 3;  // z/3
+  shadow.view_projection[6] = -0.1f;     // depth 0.5 - y/10
   shadow.view_projection[14] = 0.5f;
   shadow.view_projection[15] = 1;
   lightloom_light sun{};

@@ -65,8 +65,8 @@ struct Destroy<void(VKAPI_PTR*)(VkDevice, H, const VkAllocationCallbacks*)> {
 VKAPI_ATTR VkResult VKAPI_CALL create_pipelines(VkDevice device, VkPipelineCache, uint32_t,
                                                 const VkComputePipelineCreateInfo* info,
                                                 const VkAllocationCallbacks* callbacks, VkPipeline* out) {
-  using Function = VkResult(VKAPI_PTR*)(VkDevice, const VkComputePipelineCreateInfo*, const VkAllocationCallbacks*,
-                                        VkPipeline*);
+  using Function =
+      VkResult(VKAPI_PTR*)(VkDevice, const VkComputePipelineCreateInfo*, const VkAllocationCallbacks*, VkPipeline*);
   return Create<Function>::call(device, info, callbacks, out);
 }
 VKAPI_ATTR VkResult VKAPI_CALL allocate_sets(VkDevice, const VkDescriptorSetAllocateInfo*, VkDescriptorSet* out) {

@@ -7,10 +7,10 @@
 namespace lightloom::testing {
 
 struct FakeVulkan {
-  int64_t live = 0;       ///< objects, memory and maps that are not destroyed
-  uint64_t created = 0;   ///< ever
-  uint64_t calls = 0;     ///< that may fail
-  uint64_t fail_at = 0;   ///< number of the call that fails, from 1; 0: none
+  int64_t live = 0;      ///< objects, memory and maps that are not destroyed
+  uint64_t created = 0;  ///< ever
+  uint64_t calls = 0;    ///< that may fail
+  uint64_t fail_at = 0;  ///< number of the call that fails, from 1; 0: none
   VkResult failure = VK_ERROR_OUT_OF_DEVICE_MEMORY;
   uint64_t flushes = 0;
   uint32_t storage_buffers = 16;

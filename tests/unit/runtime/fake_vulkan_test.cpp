@@ -167,6 +167,7 @@ TEST_F(FakeVulkanTest, FramesAllocateNothingAndCreateNothing) {
   ASSERT_EQ(counts.pending_bytes, 0u);
   std::vector<float> direct(3 * counts.surface_elements, 1);
   lightloom_light light{};
+  light.first_shadow_view = LIGHTLOOM_NO_SHADOW;
   lightloom_frame_info info{};
   info.struct_size = sizeof info;
   info.lights = &light;

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -15,8 +16,10 @@ namespace lightloom::testing {
 
 struct Received {
   std::vector<std::string> errors, validation;
+  std::mutex mutex;
   static void add(void* user, lightloom_message_kind kind, const char* text) {
     auto* r = static_cast<Received*>(user);
+    const std::lock_guard lock(r->mutex);
     (kind == LIGHTLOOM_MESSAGE_ERROR ? r->errors : r->validation).emplace_back(text);
   }
 };

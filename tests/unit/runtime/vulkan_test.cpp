@@ -112,6 +112,64 @@ TEST(Vulkan, FurnaceConvergesToTheGeometricSum) {
   }
 }
 
+TEST(Vulkan, FeedbackAtHighAlbedoIsMonotoneAndBounded) {
+  RandomAssetOptions options;
+  options.closed = true;
+  options.order = 2;
+  options.relight_rays = 64;
+  SyntheticAsset asset = testing::random_asset(options);
+  TestRuntime runtime;
+  ASSERT_EQ(runtime.load(asset), LIGHTLOOM_OK) << joined(runtime.received().errors);
+  const size_t S = runtime.counts().surface_elements;
+  SurfaceLight light;
+  light.direct.assign(S, {});
+  light.albedo.assign(S, {0.5f, 0.9f, 0.99f});
+  light.emission.assign(S, {1, 1, 1});
+  runtime.light(light);
+  Vec3 before{};
+  for (int step = 0; step < 12; ++step) {
+    ASSERT_EQ(lightloom_update(runtime.get(), 50), LIGHTLOOM_OK);
+    const Vec3 e = runtime.irradiance()[0];
+    for (int c = 0; c < 3; ++c) EXPECT_GE(e[c], before[c] * 0.99999f);
+    before = e;
+  }
+  // E = πL ÷ (1 − a); 0.99^600 = 0.0024.
+  for (const Vec3 e : runtime.irradiance()) {
+    EXPECT_NEAR(e.x, 6.2832, 0.02 * 6.2832);
+    EXPECT_NEAR(e.y, 31.416, 0.02 * 31.416);
+    EXPECT_NEAR(e.z, 314.16, 0.02 * 314.16);
+  }
+  // Albedo 1 has no finite sum; it is taken as LIGHTLOOM_MAX_ALBEDO.
+  light.albedo.assign(S, {1, 1, 1});
+  runtime.light(light);
+  ASSERT_EQ(lightloom_update(runtime.get(), 500), LIGHTLOOM_OK);
+  for (const Vec3 e : runtime.irradiance()) EXPECT_LT(e.x, 1.001f * 314.16f);
+}
+
+TEST(Vulkan, NoAssetMakesFeedbackDiverge) {
+  SyntheticAsset asset = testing::random_asset({});
+  // A baker would not write that: every coefficient ten thousand times too large.
+  for (CellEntry& cell : asset.manifest.cells) {
+    CellChunk chunk = *decode_cell(asset.chunks.at(cell.chunk.digest));
+    for (CellChunk::Cluster& c : chunk.clusters) {
+      for (Half& h : c.reconstruction) h = float_to_half(1e4f * half_to_float(h));
+    }
+    cell.chunk = asset.put(encode_cell(chunk));
+  }
+  TestRuntime runtime;
+  ASSERT_EQ(runtime.load(asset), LIGHTLOOM_OK) << joined(runtime.received().errors);
+  const size_t S = runtime.counts().surface_elements;
+  SurfaceLight light = testing::random_light(static_cast<uint32_t>(S), 7);
+  light.albedo.assign(S, {0.99f, 0.99f, 0.99f});
+  light.environment = {1, 1, 1};
+  runtime.light(light);
+  ASSERT_EQ(lightloom_update(runtime.get(), 1000), LIGHTLOOM_OK);
+  // |E| ≤ π·C ÷ (1 − 0.99), C ≤ 0.99·20/π + 5.
+  for (const Vec3 e : runtime.irradiance()) {
+    for (int c = 0; c < 3; ++c) EXPECT_LE(std::abs(e[c]), 3.1416f * 11.31f * 100.1f);
+  }
+}
+
 TEST(Vulkan, StatsCountFramesTimeAndBytes) {
   SyntheticAsset asset = testing::random_asset({});
   TestRuntime runtime;
