@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstring>
 
-#include "runtime/vulkan/status.h"
+#include "runtime/renderer/status.h"
 
 namespace lightloom::renderer {
 namespace {
@@ -67,8 +67,9 @@ void make_levels(VkCommandBuffer commands, const Texture2D& texture) {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<Gpu>> Gpu::create(bool validation) {
+absl::StatusOr<std::unique_ptr<Gpu>> Gpu::create(bool validation, std::vector<std::string>* messages) {
   std::unique_ptr<Gpu> gpu(new Gpu);
+  if (messages) gpu->messages_ = messages;
   LL_RETURN_IF_ERROR(gpu->create_instance(validation));
   LL_RETURN_IF_ERROR(gpu->create_device());
   return gpu;
@@ -88,7 +89,7 @@ absl::Status Gpu::create_instance(bool validation) {
       VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT;
   messenger.messageType = VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT;
   messenger.pfnUserCallback = on_message;
-  messenger.pUserData = &messages_;
+  messenger.pUserData = messages_;
   messenger.pNext = &features;
 
   const char* extensions[] = {VK_EXT_DEBUG_UTILS_EXTENSION_NAME, VK_EXT_VALIDATION_FEATURES_EXTENSION_NAME};
@@ -180,7 +181,7 @@ Gpu::~Gpu() {
 }
 
 absl::Status Gpu::validation() const {
-  return messages_.empty() ? absl::OkStatus() : absl::InternalError("Vulkan validation: " + messages_.front());
+  return messages_->empty() ? absl::OkStatus() : absl::InternalError("Vulkan validation: " + messages_->front());
 }
 
 absl::Status Gpu::run(const std::function<absl::Status(VkCommandBuffer)>& record) {

@@ -71,8 +71,9 @@ struct TextureInfo {
 
 class Gpu {
  public:
-  /// NotFound: no Vulkan 1.3 device with a graphics queue and dynamic rendering.
-  static absl::StatusOr<std::unique_ptr<Gpu>> create(bool validation);
+  /// NotFound: no Vulkan 1.3 device with a graphics queue. `messages` takes what the validation layers say, also while
+  /// this is destroyed; it must outlive this. Null: a list of its own.
+  static absl::StatusOr<std::unique_ptr<Gpu>> create(bool validation, std::vector<std::string>* messages = nullptr);
   ~Gpu();
   Gpu(const Gpu&) = delete;
   Gpu& operator=(const Gpu&) = delete;
@@ -103,7 +104,8 @@ class Gpu {
   absl::Status create_device();
   absl::StatusOr<Owned<VkDeviceMemory>> allocate(const VkMemoryRequirements& need, bool host) const;
 
-  std::vector<std::string> messages_;
+  std::vector<std::string> own_messages_;
+  std::vector<std::string>* messages_ = &own_messages_;
   VkInstance instance_ = VK_NULL_HANDLE;
   VkDebugUtilsMessengerEXT messenger_ = VK_NULL_HANDLE;
   VkPhysicalDevice physical_ = VK_NULL_HANDLE;

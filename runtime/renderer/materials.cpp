@@ -4,7 +4,7 @@
 #include <array>
 #include <bit>
 
-#include "runtime/vulkan/status.h"
+#include "runtime/renderer/status.h"
 
 namespace lightloom::renderer {
 namespace {

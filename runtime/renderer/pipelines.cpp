@@ -6,7 +6,7 @@
 
 #include "runtime/renderer/mesh.h"
 #include "runtime/renderer/shaders/frame.h"
-#include "runtime/vulkan/status.h"
+#include "runtime/renderer/status.h"
 
 namespace lightloom::renderer {
 namespace {

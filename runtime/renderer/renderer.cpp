@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "runtime/vulkan/status.h"
+#include "runtime/renderer/status.h"
 
 namespace lightloom::renderer {
 namespace {

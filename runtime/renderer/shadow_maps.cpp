@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <string>
 
-#include "runtime/vulkan/status.h"
+#include "runtime/renderer/status.h"
 
 namespace lightloom::renderer {
 namespace {
