@@ -82,9 +82,9 @@ absl::StatusOr<std::vector<Vec3>> play_vulkan(const std::filesystem::path& loom,
 
   const uint64_t n = inputs.direct.size();
   const float sky[3] = {environment.x, environment.y, environment.z};
-  LL_RETURN_IF_ERROR(messages.status(lightloom_set_direct(raw, floats(inputs.direct), n)));
-  LL_RETURN_IF_ERROR(messages.status(lightloom_set_albedo(raw, floats(inputs.albedo), n)));
-  LL_RETURN_IF_ERROR(messages.status(lightloom_set_emission(raw, floats(inputs.emission), n)));
+  LL_RETURN_IF_ERROR(messages.status(lightloom_set_direct(raw, floats(inputs.direct), 0, n)));
+  LL_RETURN_IF_ERROR(messages.status(lightloom_set_albedo(raw, floats(inputs.albedo), 0, n)));
+  LL_RETURN_IF_ERROR(messages.status(lightloom_set_emission(raw, floats(inputs.emission), 0, n)));
   LL_RETURN_IF_ERROR(messages.status(lightloom_set_environment(raw, sky)));
   LL_RETURN_IF_ERROR(messages.status(lightloom_update(raw, static_cast<uint32_t>(options.iterations))));
   std::vector<Vec3> e(n);
@@ -93,7 +93,7 @@ absl::StatusOr<std::vector<Vec3>> play_vulkan(const std::filesystem::path& loom,
     lightloom_stats stats{};
     stats.struct_size = sizeof stats;
     LL_RETURN_IF_ERROR(messages.status(lightloom_get_stats(raw, &stats)));
-    *times = {stats.radiosity_ms, stats.relight_ms, stats.project_ms, stats.receive_ms};
+    *times = {stats.radiosity_ms, stats.select_ms + stats.relight_ms, stats.project_ms, stats.receive_ms};
   }
   return e;
 }

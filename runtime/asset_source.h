@@ -9,6 +9,7 @@
 
 #include "core/asset/chunk.h"
 #include "core/asset/manifest.h"
+#include "runtime/asset_index.h"
 
 namespace lightloom {
 
@@ -35,7 +36,7 @@ class AssetSource {
   static absl::StatusOr<AssetSource> open(std::span<const uint8_t> manifest, ReadChunk read);
 
   const Manifest& manifest() const { return manifest_; }
-  uint32_t surface_elements() const { return surface_elements_; }
+  uint32_t surface_elements() const { return index_.surface_elements(); }
 
   /// Each cell and each probe's rays may be read any number of times, in any order.
   absl::StatusOr<SourceCell> cell(uint32_t index) const;
@@ -43,20 +44,18 @@ class AssetSource {
   absl::StatusOr<std::vector<uint32_t>> relight(uint32_t probe) const;
 
  private:
-  struct ObjectTexels {
-    Digest id;
-    uint32_t width = 0, height = 0;
-    uint32_t first_element = 0;
-    std::vector<uint32_t> keys;
-  };
-
+  AssetSource(Manifest manifest, AssetIndex index, ReadChunk read)
+      : manifest_(std::move(manifest)), index_(std::move(index)), read_(std::move(read)) {}
   absl::StatusOr<std::vector<uint8_t>> chunk(const ChunkRef& ref) const;
-  absl::StatusOr<std::vector<const ObjectTexels*>> resolve(const std::vector<ChunkObject>& objects) const;
+  std::vector<SurfaceKeys> keys_of(std::span<const uint32_t> objects) const;
 
   Manifest manifest_;
+  AssetIndex index_;
   ReadChunk read_;
-  uint32_t surface_elements_ = 0;
-  std::vector<ObjectTexels> objects_;  ///< sorted by id
+  std::vector<SurfaceKeys> keys_;  ///< per object
 };
+
+/// Why a chunk of that size is not even read.
+absl::Status check_chunk_size(const ChunkRef& ref);
 
 }  // namespace lightloom

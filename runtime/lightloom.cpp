@@ -1,25 +1,90 @@
-// The C boundary: checks arguments, turns statuses into results, lets no exception out.
+// The functions of lightloom.h but for lightloom_create: they check arguments and hand on to the backend.
 #include "runtime/include/lightloom.h"
 
-#include <algorithm>
 #include <cmath>
-#include <cstring>
-#include <memory>
-#include <new>
 #include <span>
 #include <string>
 
-#include "runtime/runtime.h"
-
-struct lightloom_runtime {
-  std::unique_ptr<lightloom::Runtime> impl;
-};
+#include "runtime/asset_source.h"
+#include "runtime/boundary.h"
 
 namespace lightloom {
 namespace {
 
-/// Which status code stands for which result, in all of runtime/ and in core/asset.
+absl::Status marked(absl::Status status, const char* payload) {
+  status.SetPayload(payload, {});
+  return status;
+}
+
+absl::Status check_range(const void* rgb, uint64_t first, uint64_t count, const Backend& backend) {
+  if (rgb == nullptr && count > 0) return absl::InvalidArgumentError("the array is null");
+  const uint64_t elements = backend.surface_elements();
+  if (first > elements || count > elements - first) {
+    return absl::InvalidArgumentError("elements " + std::to_string(first) + " and " + std::to_string(count) +
+                                      " on are set, the asset has " + std::to_string(elements));
+  }
+  return absl::OkStatus();
+}
+
+/// Feedback would keep a NaN for ever, and an albedo above 1 grows without bound.
+absl::Status check_values(const char* what, std::span<const float> rgb, float lowest, float highest) {
+  for (size_t i = 0; i < rgb.size(); ++i) {
+    if (!std::isfinite(rgb[i]) || rgb[i] < lowest || rgb[i] > highest) {
+      return absl::InvalidArgumentError(std::string(what) + " number " + std::to_string(i / 3) + " is " +
+                                        std::to_string(rgb[i]) + "; give a finite value in range");
+    }
+  }
+  return absl::OkStatus();
+}
+
+constexpr float kMax = 3.402823466e38f;
+
+lightloom_result set_array(lightloom_runtime* runtime, SurfaceInput input, const char* what, const float* rgb,
+                           uint64_t first, uint64_t count, float lowest, float highest) {
+  return with_asset(runtime, [&](Backend& backend) -> absl::Status {
+    LL_RETURN_IF_ERROR(check_range(rgb, first, count, backend));
+    const std::span<const float> values(rgb, count * 3);
+    LL_RETURN_IF_ERROR(check_values(what, values, lowest, highest));
+    if (count > 0) backend.set(input, first, values);
+    return absl::OkStatus();
+  });
+}
+
+Digest digest_of(const uint8_t bytes[32]) {
+  Digest digest;
+  std::copy(bytes, bytes + 32, digest.bytes.begin());
+  return digest;
+}
+
+/// lightloom_load's reader of one chunk after the other.
+struct Loader {
+  Backend* backend;
+  const lightloom_asset_info* info;
+  std::vector<uint8_t> bytes;
+
+  static absl::Status visit(void* user, const Digest& digest, uint64_t size) {
+    auto* self = static_cast<Loader*>(user);
+    LL_RETURN_IF_ERROR(check_chunk_size({digest, size}));
+    self->bytes.resize(size);
+    if (self->info->read_chunk(self->info->read_user, digest.bytes.data(), size, self->bytes.data()) != 0) {
+      return absl::AbortedError("chunk " + digest.hex() + " could not be read; is the asset complete?");
+    }
+    return self->backend->load_chunk(digest, self->bytes);
+  }
+};
+
+}  // namespace
+
+absl::Status over_budget(const std::string& message) {
+  return marked(absl::ResourceExhaustedError(message), kOverBudget);
+}
+absl::Status not_ready(const std::string& message) { return marked(absl::FailedPreconditionError(message), kNotReady); }
+absl::Status unknown_chunk(const std::string& message) { return marked(absl::NotFoundError(message), kUnknownChunk); }
+
 lightloom_result result_of(const absl::Status& status) {
+  if (status.GetPayload(kOverBudget)) return LIGHTLOOM_ERROR_OVER_BUDGET;
+  if (status.GetPayload(kNotReady)) return LIGHTLOOM_ERROR_NOT_READY;
+  if (status.GetPayload(kUnknownChunk)) return LIGHTLOOM_ERROR_UNKNOWN_CHUNK;
   switch (status.code()) {
     case absl::StatusCode::kOk:
       return LIGHTLOOM_OK;
@@ -46,85 +111,11 @@ lightloom_result result_of(const absl::Status& status) {
   }
 }
 
-/// Runs `body`, which returns an absl::Status, and reports what went wrong.
-template <class Body>
-lightloom_result guarded(const Messages& messages, Body body) noexcept {
-  try {
-    absl::Status status;
-    try {
-      status = body();
-    } catch (const std::bad_alloc&) {
-      status = absl::ResourceExhaustedError("out of host memory; unload something, or bake a smaller asset");
-    } catch (const std::exception& e) {
-      status = absl::InternalError(e.what());
-    }
-    if (!status.ok()) messages.send(LIGHTLOOM_MESSAGE_ERROR, std::string(status.message()));
-    return result_of(status);
-  } catch (...) {  // no memory for the message
-    return LIGHTLOOM_ERROR_OUT_OF_MEMORY;
-  }
-}
-
-/// As guarded(), for functions that need an asset; `body` takes the runtime.
-template <class Body>
-lightloom_result with_asset(const lightloom_runtime* runtime, Body body) noexcept {
-  if (runtime == nullptr) return LIGHTLOOM_ERROR_INVALID_ARGUMENT;
-  return guarded(runtime->impl->messages(), [&]() -> absl::Status {
-    if (runtime->impl->asset() == nullptr) {
-      return absl::FailedPreconditionError("no asset is loaded; call lightloom_load first");
-    }
-    return body(*runtime->impl);
-  });
-}
-
-absl::Status check_array(const void* rgb, uint64_t elements, const GpuAsset& asset) {
-  if (rgb == nullptr) return absl::InvalidArgumentError("the array is null");
-  if (elements != asset.counts().surface_elements) {
-    return absl::InvalidArgumentError("array has " + std::to_string(elements) + " elements, the asset " +
-                                      std::to_string(asset.counts().surface_elements) + " surface elements");
-  }
-  return absl::OkStatus();
-}
-
-/// Feedback would keep a NaN for ever, and an albedo above 1 grows without bound.
-absl::Status check_values(const char* what, std::span<const float> rgb, float lowest, float highest) {
-  for (size_t i = 0; i < rgb.size(); ++i) {
-    if (!std::isfinite(rgb[i]) || rgb[i] < lowest || rgb[i] > highest) {
-      return absl::InvalidArgumentError(std::string(what) + " of element " + std::to_string(i / 3) + " is " +
-                                        std::to_string(rgb[i]) + "; give a finite value in range");
-    }
-  }
-  return absl::OkStatus();
-}
-
-lightloom_result set_array(lightloom_runtime* runtime, SurfaceArray array, const char* what, const float* rgb,
-                           uint64_t elements, float lowest, float highest) {
-  return with_asset(runtime, [&](Runtime& r) -> absl::Status {
-    LL_RETURN_IF_ERROR(check_array(rgb, elements, *r.asset()));
-    const std::span<const float> values(rgb, elements * 3);
-    LL_RETURN_IF_ERROR(check_values(what, values, lowest, highest));
-    return r.set(array, values);
-  });
-}
-
-/// Copies as much of `from` as the caller's struct holds.
-template <class T>
-absl::Status fill(const T& from, T* to) {
-  if (to == nullptr || to->struct_size < sizeof(uint32_t)) {
-    return absl::InvalidArgumentError("the output is null or its struct_size is not set");
-  }
-  const uint32_t size = to->struct_size;
-  std::memcpy(to, &from, std::min<size_t>(size, sizeof(T)));
-  to->struct_size = size;
-  return absl::OkStatus();
-}
-
-constexpr float kMax = 3.402823466e38f;
-
-}  // namespace
 }  // namespace lightloom
 
+using lightloom::Backend;
 using lightloom::guarded;
+using lightloom::SurfaceInput;
 using lightloom::with_asset;
 
 extern "C" {
@@ -153,6 +144,12 @@ const char* lightloom_result_string(lightloom_result result) {
       return "device lost";
     case LIGHTLOOM_ERROR_INTERNAL:
       return "internal error";
+    case LIGHTLOOM_ERROR_OVER_BUDGET:
+      return "over the byte budget";
+    case LIGHTLOOM_ERROR_UNKNOWN_CHUNK:
+      return "the manifest does not name that chunk";
+    case LIGHTLOOM_ERROR_NOT_READY:
+      return "another chunk must be loaded first";
   }
   return "unknown result";
 }
@@ -161,104 +158,126 @@ uint32_t lightloom_version(void) {
   return LIGHTLOOM_VERSION_MAJOR << 22 | LIGHTLOOM_VERSION_MINOR << 12 | LIGHTLOOM_VERSION_PATCH;
 }
 
-lightloom_result lightloom_create(const lightloom_create_info* info, lightloom_runtime** out) {
-  if (out == nullptr) return LIGHTLOOM_ERROR_INVALID_ARGUMENT;
-  *out = nullptr;
-  if (info == nullptr || info->struct_size < sizeof(lightloom_create_info)) return LIGHTLOOM_ERROR_INVALID_ARGUMENT;
-  lightloom::RuntimeOptions options;
-  options.messages = {info->message, info->message_user};
-  return guarded(options.messages, [&]() -> absl::Status {
-    constexpr uint32_t kKnown = LIGHTLOOM_CREATE_VALIDATION | LIGHTLOOM_CREATE_FORCE_STAGING;
-    if ((info->flags & ~kKnown) != 0 || info->reserved != 0) {
-      return absl::InvalidArgumentError("lightloom_create_info has unknown flags or a reserved field that is not 0");
-    }
-    options.validation = (info->flags & LIGHTLOOM_CREATE_VALIDATION) != 0;
-    options.force_staging = (info->flags & LIGHTLOOM_CREATE_FORCE_STAGING) != 0;
-    options.page_bytes = info->page_bytes;
-    options.max_groups = info->max_workgroups;
-    auto runtime = std::make_unique<lightloom_runtime>();
-    LL_ASSIGN_OR_RETURN(runtime->impl, lightloom::Runtime::create(options));
-    *out = runtime.release();
-    return absl::OkStatus();
+void lightloom_destroy(lightloom_runtime* runtime) {
+  if (runtime == nullptr) return;
+  runtime->backend = nullptr;
+  lightloom::HostMemory memory = runtime->memory;
+  runtime->~lightloom_runtime();
+  memory.deallocate(runtime, sizeof(lightloom_runtime), alignof(lightloom_runtime));
+}
+
+lightloom_result lightloom_load_manifest(lightloom_runtime* runtime, const void* manifest, uint64_t bytes) {
+  if (runtime == nullptr) return LIGHTLOOM_ERROR_INVALID_ARGUMENT;
+  return guarded(runtime->messages, [&]() -> absl::Status {
+    if (manifest == nullptr) return absl::InvalidArgumentError("the manifest is null");
+    return runtime->backend->load_manifest({static_cast<const uint8_t*>(manifest), bytes});
   });
 }
 
-void lightloom_destroy(lightloom_runtime* runtime) { delete runtime; }
+lightloom_result lightloom_load_chunk(lightloom_runtime* runtime, const uint8_t digest[32], const void* bytes,
+                                      uint64_t size) {
+  return with_asset(runtime, [&](Backend& backend) -> absl::Status {
+    if (digest == nullptr || bytes == nullptr) return absl::InvalidArgumentError("the digest or the chunk is null");
+    return backend.load_chunk(lightloom::digest_of(digest), {static_cast<const uint8_t*>(bytes), size});
+  });
+}
+
+lightloom_result lightloom_unload_chunk(lightloom_runtime* runtime, const uint8_t digest[32]) {
+  return with_asset(runtime, [&](Backend& backend) -> absl::Status {
+    if (digest == nullptr) return absl::InvalidArgumentError("the digest is null");
+    return backend.unload_chunk(lightloom::digest_of(digest));
+  });
+}
 
 lightloom_result lightloom_load(lightloom_runtime* runtime, const lightloom_asset_info* info) {
   if (runtime == nullptr) return LIGHTLOOM_ERROR_INVALID_ARGUMENT;
-  return guarded(runtime->impl->messages(), [&]() -> absl::Status {
+  return guarded(runtime->messages, [&]() -> absl::Status {
     if (info == nullptr || info->struct_size < sizeof(lightloom_asset_info) || info->manifest == nullptr ||
         info->read_chunk == nullptr || info->reserved != 0) {
       return absl::InvalidArgumentError("lightloom_asset_info is null, its struct_size is wrong or a field is missing");
     }
-    const auto read = [info](const lightloom::ChunkRef& ref, std::span<uint8_t> bytes) -> absl::Status {
-      if (info->read_chunk(info->read_user, ref.digest.bytes.data(), ref.size, bytes.data()) == 0) {
-        return absl::OkStatus();
-      }
-      return absl::AbortedError("chunk " + ref.digest.hex() + " could not be read; is the asset complete?");
-    };
-    return runtime->impl->load({static_cast<const uint8_t*>(info->manifest), info->manifest_bytes}, read);
+    Backend& backend = *runtime->backend;
+    LL_RETURN_IF_ERROR(backend.load_manifest(
+        {static_cast<const uint8_t*>(info->manifest), static_cast<size_t>(info->manifest_bytes)}));
+    lightloom::Loader loader{&backend, info, {}};
+    absl::Status status;
+    try {
+      status = backend.for_each_chunk(lightloom::Loader::visit, &loader);
+    } catch (...) {
+      backend.unload();
+      throw;
+    }
+    if (!status.ok()) backend.unload();
+    return status;
   });
 }
 
 void lightloom_unload(lightloom_runtime* runtime) {
-  if (runtime != nullptr) runtime->impl->unload();
+  if (runtime != nullptr) runtime->backend->unload();
 }
 
-lightloom_result lightloom_get_counts(const lightloom_runtime* runtime, lightloom_counts* counts) {
-  return with_asset(runtime, [&](const lightloom::Runtime& r) {
-    const auto& c = r.asset()->counts();
-    return lightloom::fill(lightloom_counts{sizeof(lightloom_counts), c.surface_elements, c.receivers, c.probes,
-                                            c.cells, c.clusters, c.pages, c.order, c.gpu_bytes},
-                           counts);
-  });
+lightloom_result lightloom_get_counts(lightloom_runtime* runtime, lightloom_counts* counts) {
+  return with_asset(runtime, [&](Backend& backend) { return lightloom::fill(backend.counts(), counts); });
 }
 
-lightloom_result lightloom_set_direct(lightloom_runtime* runtime, const float* rgb, uint64_t elements) {
-  return lightloom::set_array(runtime, lightloom::SurfaceArray::kDirect, "direct irradiance", rgb, elements,
-                              -lightloom::kMax, lightloom::kMax);
+lightloom_result lightloom_set_direct(lightloom_runtime* runtime, const float* rgb, uint64_t first, uint64_t count) {
+  return lightloom::set_array(runtime, SurfaceInput::kDirect, "direct irradiance", rgb, first, count, -lightloom::kMax,
+                              lightloom::kMax);
 }
-lightloom_result lightloom_set_albedo(lightloom_runtime* runtime, const float* rgb, uint64_t elements) {
-  return lightloom::set_array(runtime, lightloom::SurfaceArray::kAlbedo, "albedo", rgb, elements, 0, 1);
+lightloom_result lightloom_set_albedo(lightloom_runtime* runtime, const float* rgb, uint64_t first, uint64_t count) {
+  return lightloom::set_array(runtime, SurfaceInput::kAlbedo, "albedo", rgb, first, count, 0, 1);
 }
-lightloom_result lightloom_set_emission(lightloom_runtime* runtime, const float* rgb, uint64_t elements) {
-  return lightloom::set_array(runtime, lightloom::SurfaceArray::kEmission, "emission", rgb, elements, -lightloom::kMax,
+lightloom_result lightloom_set_emission(lightloom_runtime* runtime, const float* rgb, uint64_t first, uint64_t count) {
+  return lightloom::set_array(runtime, SurfaceInput::kEmission, "emission", rgb, first, count, -lightloom::kMax,
                               lightloom::kMax);
 }
 lightloom_result lightloom_set_environment(lightloom_runtime* runtime, const float rgb[3]) {
-  return with_asset(runtime, [&](lightloom::Runtime& r) -> absl::Status {
+  return with_asset(runtime, [&](Backend& backend) -> absl::Status {
     if (rgb == nullptr) return absl::InvalidArgumentError("the environment is null");
     LL_RETURN_IF_ERROR(lightloom::check_values("environment", {rgb, 3}, -lightloom::kMax, lightloom::kMax));
-    r.set_environment({rgb[0], rgb[1], rgb[2]});
+    backend.set_environment({rgb[0], rgb[1], rgb[2]});
     return absl::OkStatus();
   });
 }
 
-lightloom_result lightloom_update(lightloom_runtime* runtime, uint32_t iterations) {
-  return with_asset(runtime, [&](lightloom::Runtime& r) { return r.update(iterations); });
-}
-
-lightloom_result lightloom_read_irradiance(lightloom_runtime* runtime, float* rgb, uint64_t elements) {
-  return with_asset(runtime, [&](lightloom::Runtime& r) -> absl::Status {
-    LL_RETURN_IF_ERROR(lightloom::check_array(rgb, elements, *r.asset()));
-    return r.read_irradiance({rgb, elements * 3});
+lightloom_result lightloom_set_update_options(lightloom_runtime* runtime, const lightloom_update_options* options) {
+  if (runtime == nullptr) return LIGHTLOOM_ERROR_INVALID_ARGUMENT;
+  return guarded(runtime->messages, [&]() -> absl::Status {
+    if (options == nullptr || options->struct_size < sizeof(lightloom_update_options)) {
+      return absl::InvalidArgumentError("lightloom_update_options is null or its struct_size is wrong");
+    }
+    lightloom_update_options o = *options;
+    if (!(o.epsilon >= 0) || !(o.epsilon_floor >= 0) || !(o.smoothing >= 0) || !(o.smoothing <= 1) ||
+        !std::isfinite(o.epsilon) || !std::isfinite(o.epsilon_floor)) {
+      return absl::InvalidArgumentError("epsilon and epsilon_floor must be at least 0, smoothing within [0, 1]");
+    }
+    if (o.smoothing == 0) o.smoothing = 1;
+    return runtime->backend->set_options(o);
   });
 }
 
 lightloom_result lightloom_reset_feedback(lightloom_runtime* runtime) {
-  return with_asset(runtime, [&](lightloom::Runtime& r) { return r.reset_feedback(); });
+  return with_asset(runtime, [&](Backend& backend) -> absl::Status {
+    backend.reset_feedback();
+    return absl::OkStatus();
+  });
 }
 
-lightloom_result lightloom_get_stats(const lightloom_runtime* runtime, lightloom_stats* stats) {
-  return with_asset(runtime, [&](const lightloom::Runtime& r) {
-    const auto& s = r.stats();
-    const auto& c = r.asset()->counts();
-    const auto& ms = s.milliseconds;
-    return lightloom::fill(lightloom_stats{sizeof(lightloom_stats), s.frames, s.timestamps ? 1u : 0u, 0, ms[0], ms[1],
-                                           ms[2], ms[3], c.relight_bytes, c.project_bytes, c.receive_bytes},
-                           stats);
+lightloom_result lightloom_update(lightloom_runtime* runtime, uint32_t frames) {
+  return with_asset(runtime, [&](Backend& backend) { return backend.update(frames); });
+}
+
+lightloom_result lightloom_read_irradiance(lightloom_runtime* runtime, float* rgb, uint64_t elements) {
+  return with_asset(runtime, [&](Backend& backend) -> absl::Status {
+    if (elements != backend.surface_elements() || (rgb == nullptr && elements > 0)) {
+      return absl::InvalidArgumentError("the array is null or has another length than the surface elements");
+    }
+    return backend.read_irradiance({rgb, elements * 3});
   });
+}
+
+lightloom_result lightloom_get_stats(lightloom_runtime* runtime, lightloom_stats* stats) {
+  return with_asset(runtime, [&](Backend& backend) { return lightloom::fill(backend.stats(), stats); });
 }
 
 }  // extern "C"

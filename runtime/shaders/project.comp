@@ -5,15 +5,15 @@
 #version 450
 #include "layout.h"
 
-layout(local_size_x = kGroup) in;
 layout(push_constant) uniform Push { ProjectPush push; };
+// The pool, as four types.
 layout(std430, binding = 0) readonly buffer Clusters { Cluster clusters[]; };
-layout(std430, binding = 1) readonly buffer Jobs { Job jobs[]; };
-layout(std430, binding = 2) readonly buffer Probes { uint probes[]; };
-layout(std430, binding = 3) readonly buffer Corrections { float corrections[]; };
-layout(std430, binding = 4) readonly buffer Matrix { uvec4 matrix[]; };
-layout(std430, binding = 5) readonly buffer Lambda { vec4 lambda[]; };
-layout(std430, binding = 6) writeonly buffer Coefficients { vec4 coefficients[]; };
+layout(std430, binding = 1) readonly buffer Words { uint words[]; };
+layout(std430, binding = 2) readonly buffer Quads { uvec4 matrix[]; };
+layout(std430, binding = 3) writeonly buffer Coefficients { vec4 coefficients[]; };
+layout(std430, binding = 4) readonly buffer Lambda { vec4 lambda[]; };
+layout(std430, binding = 5) readonly buffer Active { ActiveCell active_cells[]; };
+layout(std430, binding = 6) readonly buffer Shared { Control control; };
 
 const float kInvShUniform = 0.28209479177387814;  // √(4π) ÷ 4π
 // Sums of a job: three colours of each column, then of c_0.
@@ -25,12 +25,30 @@ shared float sums[kSums];
 
 float dot8(vec4 a0, vec4 a1, vec4 w0, vec4 w1) { return dot(a0, w0) + dot(a1, w1); }
 
+/// The last of the pool's cells whose first job is not behind `job`.
+uint find_cell(uint job) {
+  uint lo = control.first_cell[push.pool], hi = lo + control.cells[push.pool];
+  while (hi - lo > 1) {
+    const uint middle = (lo + hi) / 2;
+    if (active_cells[middle].first_job <= job) lo = middle;
+    else hi = middle;
+  }
+  return lo;
+}
+
 void main() {
-  const uint job = group_index();
-  if (job >= push.jobs) return;
+  const uint group = group_index();
+  if (group >= control.jobs[push.pool]) return;
+  const uint cell = find_cell(group);
+  const uint word = active_cells[cell].base * (kCellUnit / 4);
+  const uint quad = active_cells[cell].base * (kCellUnit / 16);
+  const uint job = word + words[word + 1] + 2 * (group - active_cells[cell].first_job);
   const uint local = gl_LocalInvocationIndex;
-  const Cluster cluster = clusters[jobs[job].cluster];
-  const uint first = jobs[job].first_column;
+  const Cluster cluster = clusters[active_cells[cell].base + words[word] + words[job]];
+  const uint first = words[job + 1];
+  const uint probes = word + words[word + 2] + cluster.first_probe;
+  const uint corrections = word + words[word + 3] + cluster.first_correction;
+  const uint coefficient = quad + words[word + 7] + cluster.first_coefficient;
   const uint columns = min(kJobColumns, cluster.rank - first);
   const uint row = cluster.probes * push.stride8;
   const uint stride4 = 2 * push.stride8;
@@ -39,13 +57,13 @@ void main() {
   for (uint k = 0; k < kJobColumns; ++k) column[k] = vec3(0.0);
   for (uint e = local; e < row; e += kGroup) {
     const uint i = e / push.stride8;
-    const uint at = probes[cluster.first_probe + i] * 3 * stride4 + 2 * (e - i * push.stride8);
+    const uint at = words[probes + i] * 3 * stride4 + 2 * (e - i * push.stride8);
     const vec4 r0 = lambda[at], r1 = lambda[at + 1];
     const vec4 g0 = lambda[at + stride4], g1 = lambda[at + stride4 + 1];
     const vec4 b0 = lambda[at + 2 * stride4], b1 = lambda[at + 2 * stride4 + 1];
     for (uint k = 0; k < kJobColumns; ++k) {
       if (k >= columns) break;
-      const uvec4 w = matrix[cluster.projection + (first + k) * row + e];
+      const uvec4 w = matrix[quad + cluster.projection + (first + k) * row + e];
       const vec4 w0 = vec4(unpackHalf2x16(w.x), unpackHalf2x16(w.y));
       const vec4 w1 = vec4(unpackHalf2x16(w.z), unpackHalf2x16(w.w));
       column[k] += vec3(dot8(r0, r1, w0, w1), dot8(g0, g1, w0, w1), dot8(b0, b1, w0, w1));
@@ -53,7 +71,7 @@ void main() {
   }
   vec3 mean = vec3(0.0);
   for (uint i = local; i < cluster.probes; i += kGroup) {
-    const uint at = probes[cluster.first_probe + i] * 3 * stride4;
+    const uint at = words[probes + i] * 3 * stride4;
     mean += vec3(lambda[at].x, lambda[at + stride4].x, lambda[at + 2 * stride4].x);
   }
 
@@ -63,22 +81,20 @@ void main() {
   }
   for (uint c = 0; c < 3; ++c) partial[(3 * kJobColumns + c) * kRow + local] = mean[c];
   barrier();
-  if (local < kSums) {
+  for (uint m = local; m < kSums; m += kGroup) {
     float sum = 0.0;
-    for (uint n = 0; n < kGroup; ++n) sum += partial[local * kRow + n];
-    sums[local] = sum;
+    for (uint n = 0; n < kGroup; ++n) sum += partial[m * kRow + n];
+    sums[m] = sum;
   }
   barrier();
 
-  if (local > columns) return;
   const vec3 c0 = cluster.probes == 0 ? vec3(0.0)
                                       : vec3(sums[3 * kJobColumns], sums[3 * kJobColumns + 1],
                                              sums[3 * kJobColumns + 2]) * (kInvShUniform / float(cluster.probes));
-  if (local == columns) {
-    if (first == 0) coefficients[cluster.first_coefficient] = vec4(c0, 0.0);
-  } else {
-    const vec3 sum = vec3(sums[3 * local], sums[3 * local + 1], sums[3 * local + 2]);
-    coefficients[cluster.first_coefficient + 1 + first + local] =
-        vec4(sum - corrections[cluster.first_correction + first + local] * c0, 0.0);
+  if (local == 0 && first == 0) coefficients[coefficient] = vec4(c0, 0.0);
+  for (uint k = local; k < columns; k += kGroup) {
+    const vec3 sum = vec3(sums[3 * k], sums[3 * k + 1], sums[3 * k + 2]);
+    coefficients[coefficient + 1 + first + k] =
+        vec4(sum - uintBitsToFloat(words[corrections + first + k]) * c0, 0.0);
   }
 }

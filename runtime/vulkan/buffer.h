@@ -1,78 +1,70 @@
-// Storage buffers in few big allocations, and copies between them and the host.
+// Buffers and images with memory of their own; pools are large, so there are few.
 #pragma once
 
-#include <vulkan/vulkan.h>
-
-#include <cstdint>
-#include <memory>
-#include <span>
-#include <vector>
-
-#include "runtime/vulkan/device.h"
+#include "runtime/vulkan/context.h"
 
 namespace lightloom {
 
-/// Owned by its arena.
-struct Buffer {
-  VkBuffer handle = VK_NULL_HANDLE;
-  uint64_t size = 0;  ///< bytes
-  VkDeviceMemory memory = VK_NULL_HANDLE;
-  uint64_t memory_offset = 0, memory_size = 0;  ///< where it lies, and the size of the whole allocation
-  uint8_t* mapped = nullptr;                    ///< null: the host must copy through staging
-  bool coherent = false, cached = false;
+enum class BufferUse {
+  kDevice,    ///< device local, storage and transfers; counted in Context::bytes
+  kIndirect,  ///< as kDevice, and holds dispatch arguments
+  kHost,      ///< mapped, storage and transfers
 };
 
-enum class MemoryUse {
-  kDevice,          ///< device local; mapped if the device's memory happens to be host visible
-  kDeviceUnmapped,  ///< never mapped
-  kStaging,         ///< host visible, cached where there is such a type
-};
-
-/// Allocates memory in blocks and buffers within them; all are freed together, with the arena.
-class Arena {
+class Buffer {
  public:
-  Arena(Device* device, MemoryUse use) : device_(device), use_(use) {}
-  ~Arena();
-  Arena(const Arena&) = delete;
-  Arena& operator=(const Arena&) = delete;
+  Buffer() = default;
+  ~Buffer() { reset(); }
+  Buffer(Buffer&& other) noexcept { *this = std::move(other); }
+  Buffer& operator=(Buffer&& other) noexcept;
 
-  /// A storage buffer that can be copied from and to. ResourceExhausted; Unimplemented if it exceeds what a
-  /// shader can bind.
-  absl::StatusOr<Buffer> buffer(uint64_t size);
-  /// Sum of the buffers, without the slack of the blocks.
-  uint64_t bytes() const { return bytes_; }
+  /// ResourceExhausted; over_budget(); Unimplemented if it exceeds what a shader can bind. Size 0 makes one of 16 bytes.
+  static absl::StatusOr<Buffer> create(Context* context, uint64_t size, BufferUse use);
+
+  VkBuffer handle() const { return handle_; }
+  uint64_t size() const { return size_; }
+  bool exists() const { return handle_ != VK_NULL_HANDLE; }
+  uint8_t* mapped() const { return mapped_; }  ///< kHost
+  VkDescriptorBufferInfo whole() const { return {handle_, 0, VK_WHOLE_SIZE}; }
+
+  /// What the host wrote reaches the device once it is submitted; what the device wrote reaches the host.
+  absl::Status flush(uint64_t offset, uint64_t bytes) const;
+  absl::Status invalidate(uint64_t offset, uint64_t bytes) const;
 
  private:
-  struct Block {
-    VkDeviceMemory memory;
-    uint64_t size, used;
-    uint32_t type;
-    uint8_t* mapped;
-  };
-  absl::StatusOr<Block*> block_for(const VkMemoryRequirements& need);
+  void reset();
+  VkMappedMemoryRange atoms(uint64_t offset, uint64_t bytes) const;
 
-  Device* device_;
-  MemoryUse use_;
-  uint64_t bytes_ = 0;
-  std::vector<Block> blocks_;
-  std::vector<VkBuffer> buffers_;
+  Context* context_ = nullptr;
+  VkBuffer handle_ = VK_NULL_HANDLE;
+  VkDeviceMemory memory_ = VK_NULL_HANDLE;
+  uint64_t size_ = 0, memory_bytes_ = 0, counted_ = 0;
+  uint8_t* mapped_ = nullptr;
+  bool coherent_ = true;
 };
 
-/// Copies that are finished when the call returns.
-class Transfer {
+/// E as a 2D array image that shaders write and engines sample.
+class Image {
  public:
-  static absl::StatusOr<std::unique_ptr<Transfer>> create(Device* device);
+  Image() = default;
+  ~Image() { reset(); }
+  Image(Image&& other) noexcept { *this = std::move(other); }
+  Image& operator=(Image&& other) noexcept;
 
-  absl::Status upload(const Buffer& to, std::span<const uint8_t> bytes);
-  absl::Status download(const Buffer& from, std::span<uint8_t> bytes);
-  absl::Status clear(const Buffer& buffer);
+  static absl::StatusOr<Image> create(Context* context, VkFormat format, uint32_t width, uint32_t height,
+                                      uint32_t layers);
+
+  VkImage handle() const { return handle_; }
+  VkImageView view() const { return view_; }
 
  private:
-  explicit Transfer(Device* device) : device_(device), arena_(device, MemoryUse::kStaging) {}
+  void reset();
 
-  Device* device_;
-  Arena arena_;
-  Buffer staging_;
+  Context* context_ = nullptr;
+  VkImage handle_ = VK_NULL_HANDLE;
+  VkImageView view_ = VK_NULL_HANDLE;
+  VkDeviceMemory memory_ = VK_NULL_HANDLE;
+  uint64_t counted_ = 0;
 };
 
 }  // namespace lightloom

@@ -2,7 +2,7 @@
 // lightloom_result.
 #pragma once
 
-#include <vulkan/vulkan.h>
+#include <vulkan/vulkan_core.h>
 
 #include <string>
 

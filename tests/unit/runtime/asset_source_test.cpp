@@ -3,7 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "runtime/asset_layout.h"
 #include "tests/unit/runtime/synthetic_asset.h"
 
 namespace lightloom {
@@ -123,29 +122,6 @@ TEST_F(AssetSourceTest, ClaimedSizeIsNotAllocated) {
 TEST_F(AssetSourceTest, TooManyRelightRays) {
   asset_.manifest.params.relight_rays = 1 << 30;
   EXPECT_EQ(open().status().code(), absl::StatusCode::kUnimplemented);
-}
-
-TEST(PageBuilder, CellsFillPagesUpToTheirSize) {
-  const auto asset = testing::random_asset({});
-  const auto source = asset.open();
-  ASSERT_TRUE(source.ok()) << source.status();
-  const SourceCell cell = *source->cell(0);
-  const uint64_t alone = PageBuilder::bytes_alone(cell);
-  EXPECT_FALSE(PageBuilder(alone - 1).fits(cell));
-  PageBuilder builder(alone);
-  ASSERT_TRUE(builder.fits(cell));
-  builder.add(cell);
-  EXPECT_FALSE(builder.fits(cell));
-  PageLayout layout;
-  EXPECT_EQ(builder.take(&layout).size(), alone);
-  EXPECT_TRUE(builder.empty());
-  uint64_t end = 0;
-  for (const PageLayout::Section& s : layout.sections) {
-    EXPECT_EQ(s.offset % kSectionAlignment, 0u);
-    EXPECT_GE(s.offset, end);
-    end = s.offset + s.size;
-  }
-  EXPECT_EQ(end, alone);
 }
 
 }  // namespace

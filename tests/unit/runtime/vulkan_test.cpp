@@ -35,7 +35,8 @@ std::string joined(const std::vector<std::string>& lines) {
 /// Destroys its runtime and then demands that validation said nothing.
 class TestRuntime {
  public:
-  explicit TestRuntime(uint32_t flags = 0, uint64_t page_bytes = 0, uint32_t max_workgroups = 0) {
+  explicit TestRuntime(uint32_t flags = 0, uint64_t page_bytes = 0, uint32_t max_workgroups = 0,
+                       uint32_t workgroup_size = 0, uint64_t staging_bytes = 0) {
     lightloom_create_info info{};
     info.struct_size = sizeof info;
     info.flags = LIGHTLOOM_CREATE_VALIDATION | flags;
@@ -43,6 +44,8 @@ class TestRuntime {
     info.message_user = &received_;
     info.page_bytes = page_bytes;
     info.max_workgroups = max_workgroups;
+    info.workgroup_size = workgroup_size;
+    info.staging_bytes = staging_bytes;
     const lightloom_result result = lightloom_create(&info, &runtime_);
     EXPECT_EQ(result, LIGHTLOOM_OK) << joined(received_.errors);
   }
@@ -64,9 +67,9 @@ class TestRuntime {
     return lightloom_load(runtime_, &info);
   }
   void light(const SurfaceLight& l) {
-    ASSERT_EQ(lightloom_set_direct(runtime_, &l.direct[0].x, l.direct.size()), LIGHTLOOM_OK);
-    ASSERT_EQ(lightloom_set_albedo(runtime_, &l.albedo[0].x, l.albedo.size()), LIGHTLOOM_OK);
-    ASSERT_EQ(lightloom_set_emission(runtime_, &l.emission[0].x, l.emission.size()), LIGHTLOOM_OK);
+    ASSERT_EQ(lightloom_set_direct(runtime_, &l.direct[0].x, 0, l.direct.size()), LIGHTLOOM_OK);
+    ASSERT_EQ(lightloom_set_albedo(runtime_, &l.albedo[0].x, 0, l.albedo.size()), LIGHTLOOM_OK);
+    ASSERT_EQ(lightloom_set_emission(runtime_, &l.emission[0].x, 0, l.emission.size()), LIGHTLOOM_OK);
     ASSERT_EQ(lightloom_set_environment(runtime_, &l.environment.x), LIGHTLOOM_OK);
   }
   std::vector<Vec3> irradiance() {
@@ -107,6 +110,8 @@ struct Case {
   uint32_t flags = 0;
   uint64_t page_bytes = 0;
   uint32_t max_workgroups = 0;
+  uint32_t workgroup_size = 0;
+  uint64_t staging_bytes = 0;
 };
 void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
 
@@ -130,7 +135,7 @@ TEST_P(AgainstDecoder, EightBouncesAgree) {
   ASSERT_TRUE(decoder.ok()) << decoder.status();
   const SurfaceLight light = testing::random_light(decoder->surface_elements, 7);
 
-  TestRuntime runtime(param.flags, param.page_bytes, param.max_workgroups);
+  TestRuntime runtime(param.flags, param.page_bytes, param.max_workgroups, param.workgroup_size, param.staging_bytes);
   ASSERT_EQ(runtime.load(asset), LIGHTLOOM_OK) << joined(runtime.received().errors);
   if (param.page_bytes != 0) {
     EXPECT_GT(runtime.counts().pages, 2u);
@@ -158,7 +163,10 @@ INSTANTIATE_TEST_SUITE_P(
                       Case{"rank0", sized(3, 64, 8, 2, 0)}, Case{"one_receiver_cells", sized(1, 33, 4, 40, 9)},
                       Case{"pages", sized(4, 256, 20, 12, 32), 0, 48 << 10},
                       Case{"few_workgroups", sized(4, 256, 16, 7, 32), 0, 0, 3},
-                      Case{"staging", sized(4, 256, 20, 12, 32), LIGHTLOOM_CREATE_FORCE_STAGING, 48 << 10}),
+                      Case{"little_staging", sized(4, 256, 20, 12, 32), 0, 0, 0, 0, 4096},
+                      Case{"workgroup8", sized(9, 300, 12, 3, 20), 0, 0, 3, 8},
+                      Case{"workgroup16", sized(4, 100, 16, 7, 32), 0, 48 << 10, 0, 16},
+                      Case{"workgroup32", sized(7, 200, 12, 5, 32), 0, 0, 0, 32}),
     [](const auto& info) { return std::string(info.param.name); });
 
 TEST(Vulkan, FurnaceConvergesToTheGeometricSum) {
@@ -195,6 +203,8 @@ TEST(Vulkan, StatsCountFramesTimeAndBytes) {
   stats.struct_size = sizeof stats;
   ASSERT_EQ(lightloom_get_stats(runtime.get(), &stats), LIGHTLOOM_OK);
   EXPECT_EQ(stats.frames, 19u);
+  EXPECT_EQ(stats.updated_probes, 24u);
+  EXPECT_EQ(stats.updated_cells, 7u);
   EXPECT_EQ(stats.relight_bytes, 24u * 200 * 4);
   EXPECT_GT(stats.project_bytes, 0u);
   EXPECT_GT(stats.receive_bytes, 0u);
@@ -206,11 +216,12 @@ TEST(Vulkan, StatsCountFramesTimeAndBytes) {
   }
   // A caller built against an older, shorter struct: nothing behind it is written.
   lightloom_stats old{};
-  old.struct_size = 8;
-  old.timestamps = 77;
+  old.struct_size = 16;
+  old.upload_ms = 77;
   ASSERT_EQ(lightloom_get_stats(runtime.get(), &old), LIGHTLOOM_OK);
   EXPECT_EQ(old.frames, 19u);
-  EXPECT_EQ(old.timestamps, 77u);
+  EXPECT_EQ(old.struct_size, 16u);
+  EXPECT_EQ(old.upload_ms, 77);
 }
 
 TEST(Vulkan, CountsAreTheAssets) {
@@ -314,19 +325,21 @@ TEST_F(ErrorTest, ArgumentsAreChecked) {
   const size_t S = runtime_.counts().surface_elements;
   std::vector<float> values(3 * S, 0.5f);
   lightloom_runtime* const r = runtime_.get();
-  EXPECT_EQ(lightloom_set_albedo(r, values.data(), S), LIGHTLOOM_OK);
-  EXPECT_EQ(lightloom_set_albedo(r, values.data(), S - 1), LIGHTLOOM_ERROR_INVALID_ARGUMENT);
-  EXPECT_EQ(lightloom_set_albedo(r, nullptr, S), LIGHTLOOM_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(lightloom_set_albedo(r, values.data(), 0, S), LIGHTLOOM_OK);
+  EXPECT_EQ(lightloom_set_albedo(r, values.data(), S - 1, 1), LIGHTLOOM_OK);
+  EXPECT_EQ(lightloom_set_albedo(r, values.data(), 1, S), LIGHTLOOM_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(lightloom_set_albedo(r, values.data(), S + 1, 0), LIGHTLOOM_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(lightloom_set_albedo(r, nullptr, 0, S), LIGHTLOOM_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(lightloom_set_environment(r, nullptr), LIGHTLOOM_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(lightloom_read_irradiance(r, values.data(), S + 1), LIGHTLOOM_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(lightloom_load(r, nullptr), LIGHTLOOM_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(lightloom_get_counts(r, nullptr), LIGHTLOOM_ERROR_INVALID_ARGUMENT);
   values[5] = 1.01f;
-  EXPECT_EQ(lightloom_set_albedo(r, values.data(), S), LIGHTLOOM_ERROR_INVALID_ARGUMENT);
-  EXPECT_EQ(lightloom_set_direct(r, values.data(), S), LIGHTLOOM_OK);
+  EXPECT_EQ(lightloom_set_albedo(r, values.data(), 0, S), LIGHTLOOM_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(lightloom_set_direct(r, values.data(), 0, S), LIGHTLOOM_OK);
   values[5] = NAN;
-  EXPECT_EQ(lightloom_set_direct(r, values.data(), S), LIGHTLOOM_ERROR_INVALID_ARGUMENT);
-  EXPECT_EQ(lightloom_set_emission(r, values.data(), S), LIGHTLOOM_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(lightloom_set_direct(r, values.data(), 0, S), LIGHTLOOM_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(lightloom_set_emission(r, values.data(), 0, S), LIGHTLOOM_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(lightloom_set_environment(r, values.data() + 3), LIGHTLOOM_ERROR_INVALID_ARGUMENT);
 
   EXPECT_EQ(lightloom_update(nullptr, 1), LIGHTLOOM_ERROR_INVALID_ARGUMENT);
@@ -390,7 +403,7 @@ TEST(Vulkan, NoValidationLayerIsAMissingFeature) {
 
 TEST(Api, EveryResultHasItsOwnText) {
   std::vector<std::string> texts;
-  for (int r = LIGHTLOOM_OK; r >= LIGHTLOOM_ERROR_INTERNAL; --r) {
+  for (int r = LIGHTLOOM_OK; r >= LIGHTLOOM_ERROR_NOT_READY; --r) {
     texts.push_back(lightloom_result_string(static_cast<lightloom_result>(r)));
   }
   std::sort(texts.begin(), texts.end());

@@ -1,0 +1,168 @@
+// An asset on the device: which of its chunks are resident and where, the arrays of its surface elements, and the passes
+// over them.
+#pragma once
+
+#include <array>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "runtime/backend.h"
+#include "runtime/cell_block.h"
+#include "runtime/include/lightloom_vulkan.h"
+#include "runtime/lightmap_map.h"
+#include "runtime/vulkan/frame_memory.h"
+#include "runtime/vulkan/pools.h"
+#include "runtime/vulkan/upload.h"
+
+namespace lightloom {
+
+struct AssetOptions {
+  bool smoothing = false;
+  VkFormat image_format = VK_FORMAT_UNDEFINED;
+};
+
+/// What may change how a frame goes, beside the arrays.
+struct FrameSettings {
+  lightloom_update_options options{};  ///< smoothing in (0, 1]
+  Vec3 environment;
+};
+
+/// kUploads: only brings chunks and inputs to the device; E stays.
+enum class FrameKind { kWhole, kUploads };
+
+/// Threads: residency and set() from any, record() from one.
+class VulkanAsset {
+ public:
+  static absl::StatusOr<std::unique_ptr<VulkanAsset>> create(Context* context, const Pipelines* pipelines,
+                                                             AssetIndex index, const AssetOptions& options,
+                                                             std::pmr::memory_resource* memory);
+
+  const AssetIndex& index() const { return index_; }
+  absl::Status load_chunk(const Digest& digest, std::span<const uint8_t> bytes);
+  absl::Status unload_chunk(const Digest& digest);
+  void set(SurfaceInput input, uint64_t first, std::span<const float> rgb);
+  void set_environment(Vec3 radiance);
+  void set_options(const lightloom_update_options& options);
+  void reset_feedback();
+  bool uploads_pending() const;  ///< anything that the device does not have yet
+
+  /// Records one frame. `frame` counts from 1.
+  absl::Status record(VkCommandBuffer commands, const lightloom_frame_info& info, uint32_t frame, FrameKind kind,
+                      FrameMemory* memory);
+  /// The counters of a frame that is finished.
+  void finished(uint32_t frame, const gpu::Control& counters);
+
+  void fill_counts(lightloom_counts* counts) const;
+  void fill_stats(lightloom_stats* stats) const;
+  const Buffer& irradiance() const { return irradiance_; }
+  void fill_outputs(lightloom_vulkan_outputs* outputs) const;
+
+ private:
+  struct Surface {
+    SurfaceKeys keys;  ///< null: not resident
+  };
+  struct Probe {
+    bool resident = false, uploaded = false;
+    uint32_t slot = 0;
+  };
+  struct Cell {
+    bool resident = false, uploaded = false;
+    uint32_t missing = 0;  ///< entries of its probe list that are not uploaded
+    CellPools::Place place;
+    gpu::Cell record{};
+    std::pmr::vector<uint32_t> elements;
+  };
+  /// Memory that frames in flight may still use.
+  struct Grave {
+    uint32_t frame;  ///< the first that no longer uses it
+    bool is_slot;
+    uint32_t slot;
+    CellPools::Place place;
+  };
+
+  VulkanAsset(Context* context, const Pipelines* pipelines, AssetIndex index, const AssetOptions& options,
+              std::pmr::memory_resource* memory);
+  absl::Status create_arrays();
+  absl::Status create_sets();
+  void list_cells_of_probes();
+
+  absl::Status load_surface(uint32_t object, const SurfaceChunk& chunk);
+  absl::Status load_relight(uint32_t probe, const RelightChunk& chunk);
+  absl::Status load_cell(uint32_t cell, CellChunk chunk);
+  void unload_surface(uint32_t object);
+  void unload_relight(uint32_t probe);
+  void unload_cell(uint32_t cell);
+  absl::StatusOr<std::vector<SurfaceKeys>> keys_of(const std::vector<uint32_t>& objects) const;
+  absl::Status mark_received(uint32_t cell, const std::vector<uint32_t>& elements);
+  void uploaded(AssetIndex::Target target);
+  void write_slot(uint32_t slot, uint32_t probe);
+  void refresh_cell(uint32_t cell);
+  void touch() { touched_ = true; }
+
+  void bury(uint32_t frame);
+  bool tables_pending() const;
+  bool nothing_to_do(const lightloom_frame_info& info, uint32_t frame);
+  absl::Status record_uploads(VkCommandBuffer commands, uint32_t frame, FrameMemory* memory);
+  void record_clears(VkCommandBuffer commands);
+  absl::Status record_direct(VkCommandBuffer commands, const lightloom_frame_info& info, uint32_t frame,
+                             FrameMemory* memory);
+  void record_radiosity(VkCommandBuffer commands, const lightloom_frame_info& info, uint32_t frame);
+  void record_select_and_relight(VkCommandBuffer commands, uint32_t frame, FrameMemory* memory);
+  void record_cells(VkCommandBuffer commands, uint32_t frame, FrameMemory* memory);
+  void record_settle(VkCommandBuffer commands);
+  void record_image(VkCommandBuffer commands);
+  void dispatch_indirect(VkCommandBuffer commands, size_t offset) const;
+
+  Context* context_;
+  const Pipelines* pipelines_;
+  std::pmr::memory_resource* memory_;
+  const AssetIndex index_;
+  const AssetOptions options_;
+  const uint32_t stride_;  ///< sh_stride
+  uint32_t tile_shift_ = 6, tile_words_ = 0, sky_tile_ = 0;
+
+  mutable std::mutex mutex_;  ///< guards all below
+  std::array<ShadowTable, 3> inputs_;
+  ShadowTable cell_table_, slot_table_, map_table_;
+  Buffer irradiance_, target_, radiosity_, points_, normals_, lambda_, sh_, changed_, dirty_, slot_seen_, stamps_;
+  Buffer active_slots_, cell_probes_, cell_dirty_, cell_seen_, active_cells_, control_;
+  Image image_;
+  std::unique_ptr<DescriptorSets> sets_;
+  std::vector<VkDescriptorSet> radiosity_sets_, direct_sets_, shadowed_sets_;  ///< per frame in flight
+  std::vector<VkDescriptorBufferInfo> bound_direct_;                           ///< what radiosity_sets_ bind
+  VkDescriptorBufferInfo direct_source_{};                                     ///< of the newest frame
+  VkDescriptorSet select_probes_ = VK_NULL_HANDLE, mark_cells_ = VK_NULL_HANDLE, select_cells_ = VK_NULL_HANDLE;
+  VkDescriptorSet settle_ = VK_NULL_HANDLE, image_set_ = VK_NULL_HANDLE;
+  std::unique_ptr<CellPools> cell_pools_;
+  std::unique_ptr<RelightPools> relight_pools_;
+
+  std::pmr::vector<Surface> surfaces_;
+  std::pmr::vector<Probe> probes_;
+  std::pmr::vector<Cell> cells_;
+  std::pmr::vector<uint32_t> first_cell_, cells_of_;  ///< of each probe, the cells that read it
+  std::pmr::vector<bool> received_;                   ///< per surface element
+  std::unique_ptr<LightmapMap> map_;
+  uint32_t map_layers_ = 1;
+  UploadQueue uploads_;
+  std::pmr::deque<Grave> graves_;
+
+  FrameSettings settings_;
+  uint32_t generation_ = 0;
+  uint32_t recorded_ = 0;    ///< the newest frame
+  bool cleared_ = false;     ///< arrays are initialised
+  bool reset_ = false;       ///< E is to be set to 0
+  bool image_stale_ = true;  ///< all of the image is to be written
+  bool smooth_ = false;      ///< target_ holds what E goes towards
+  bool sky_changed_ = true;
+  bool direct_overwritten_ = false;  ///< the direct pass wrote where the host's values were
+  bool touched_ = true;              ///< something that the next frame must look at
+  bool quiet_ = false;               ///< a finished frame proved that there is nothing to do
+  uint32_t touched_frame_ = 0;       ///< the newest frame that something was new to
+
+  gpu::Control last_{};  ///< counters of the newest finished frame
+  uint32_t last_frame_ = 0, skipped_frame_ = 0;
+};
+
+}  // namespace lightloom

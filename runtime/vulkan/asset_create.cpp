@@ -1,0 +1,188 @@
+// What an asset has on the device before any of its chunks is resident.
+#include <algorithm>
+
+#include "core/base/sh.h"
+#include "runtime/vulkan/asset.h"
+
+namespace lightloom {
+namespace {
+
+/// Fewer tiles than this, so that a probe's bits of what it sees stay within 4 KiB.
+constexpr uint64_t kMaxTiles = 32768;
+
+}  // namespace
+
+VulkanAsset::VulkanAsset(Context* context, const Pipelines* pipelines, AssetIndex index, const AssetOptions& options,
+                         std::pmr::memory_resource* memory)
+    : context_(context),
+      pipelines_(pipelines),
+      memory_(memory),
+      index_(std::move(index)),
+      options_(options),
+      stride_(static_cast<uint32_t>(sh_stride(static_cast<int>(index_.order())))),
+      inputs_{ShadowTable(memory), ShadowTable(memory), ShadowTable(memory)},
+      cell_table_(memory),
+      slot_table_(memory),
+      map_table_(memory),
+      surfaces_(index_.objects().size(), memory),
+      probes_(index_.probes().size(), memory),
+      cells_(memory),
+      first_cell_(memory),
+      cells_of_(memory),
+      received_(index_.surface_elements(), false, memory),
+      uploads_(memory),
+      graves_(memory) {
+  settings_.options.smoothing = 1;
+}
+
+absl::StatusOr<std::unique_ptr<VulkanAsset>> VulkanAsset::create(Context* context, const Pipelines* pipelines,
+                                                                 AssetIndex index, const AssetOptions& options,
+                                                                 std::pmr::memory_resource* memory) {
+  std::unique_ptr<VulkanAsset> asset(new VulkanAsset(context, pipelines, std::move(index), options, memory));
+  asset->list_cells_of_probes();
+  LL_RETURN_IF_ERROR(asset->create_arrays());
+  LL_RETURN_IF_ERROR(asset->create_sets());
+  return asset;
+}
+
+void VulkanAsset::list_cells_of_probes() {
+  first_cell_.assign(probes_.size() + 1, 0);
+  for (uint32_t c = 0; c < index_.cells().size(); ++c) {
+    for (const uint32_t p : index_.probes_of(c)) ++first_cell_[p + 1];
+  }
+  for (size_t p = 0; p < probes_.size(); ++p) first_cell_[p + 1] += first_cell_[p];
+  cells_of_.resize(first_cell_.back());
+  std::pmr::vector<uint32_t> next(first_cell_.begin(), first_cell_.end(), memory_);
+  for (uint32_t c = 0; c < index_.cells().size(); ++c) {
+    for (const uint32_t p : index_.probes_of(c)) cells_of_[next[p]++] = c;
+  }
+}
+
+absl::Status VulkanAsset::create_arrays() {
+  const uint64_t S = index_.surface_elements(), P = probes_.size(), C = index_.cells().size();
+  while ((S >> tile_shift_) + 2 > kMaxTiles) ++tile_shift_;
+  sky_tile_ = static_cast<uint32_t>((S + (uint64_t{1} << tile_shift_) - 1) >> tile_shift_);
+  tile_words_ = sky_tile_ / 32 + 1;
+
+  for (ShadowTable& input : inputs_) LL_RETURN_IF_ERROR(input.create(context_, 12 * S, 4));
+  LL_RETURN_IF_ERROR(cell_table_.create(context_, C * sizeof(gpu::Cell), sizeof(gpu::Cell)));
+  LL_RETURN_IF_ERROR(slot_table_.create(context_, P * sizeof(gpu::Slot), sizeof(gpu::Slot), 0xff));
+  const auto buffer = [this](Buffer* to, uint64_t bytes, BufferUse use = BufferUse::kDevice) -> absl::Status {
+    LL_ASSIGN_OR_RETURN(*to, Buffer::create(context_, bytes, use));
+    return absl::OkStatus();
+  };
+  LL_RETURN_IF_ERROR(buffer(&irradiance_, 12 * S));
+  if (options_.smoothing) LL_RETURN_IF_ERROR(buffer(&target_, 12 * S));
+  LL_RETURN_IF_ERROR(buffer(&radiosity_, 16 * S));
+  LL_RETURN_IF_ERROR(buffer(&points_, 16 * S));
+  LL_RETURN_IF_ERROR(buffer(&normals_, 4 * S));
+  LL_RETURN_IF_ERROR(buffer(&lambda_, P * 3 * stride_ * sizeof(float)));
+  LL_RETURN_IF_ERROR(buffer(&changed_, 4 * tile_words_));
+  LL_RETURN_IF_ERROR(buffer(&dirty_, 4 * P));
+  LL_RETURN_IF_ERROR(buffer(&slot_seen_, 4 * P));
+  LL_RETURN_IF_ERROR(buffer(&stamps_, 4 * P));
+  LL_RETURN_IF_ERROR(buffer(&cell_probes_, 4 * index_.cell_probes().size()));
+  LL_RETURN_IF_ERROR(buffer(&cell_dirty_, 4 * C));
+  LL_RETURN_IF_ERROR(buffer(&cell_seen_, 4 * C));
+  LL_RETURN_IF_ERROR(buffer(&active_cells_, C * sizeof(gpu::ActiveCell)));
+  LL_RETURN_IF_ERROR(buffer(&control_, sizeof(gpu::Control), BufferUse::kIndirect));
+
+  cells_.resize(C);
+  for (uint32_t c = 0; c < C; ++c) {
+    Cell& cell = cells_[c];
+    cell.missing = index_.cells()[c].probes;
+    cell.record.first_probe = index_.cells()[c].first_probe;
+    cell.record.probes = index_.cells()[c].probes;
+    cell_table_.as<gpu::Cell>()[c] = cell.record;
+  }
+  if (C > 0) cell_table_.touch(0, cell_table_.bytes());
+
+  const auto fill = [this](const Buffer& to, std::pmr::vector<uint8_t> bytes) {
+    Upload upload{{AssetIndex::Kind::kSurface, UINT32_MAX}, to.handle(), 0, std::move(bytes), 0, 0, false, false};
+    uploads_.push(std::move(upload));
+  };
+  std::pmr::vector<uint8_t> table = sh_table(index_.order(), P == 0 ? 0 : index_.rays(), memory_);
+  LL_RETURN_IF_ERROR(buffer(&sh_, table.size()));
+  fill(sh_, std::move(table));
+  const auto* lists = reinterpret_cast<const uint8_t*>(index_.cell_probes().data());
+  fill(cell_probes_, std::pmr::vector<uint8_t>(lists, lists + 4 * index_.cell_probes().size(), memory_));
+
+  if (options_.image_format != VK_FORMAT_UNDEFINED && index_.width() > 0 && index_.height() > 0) {
+    const uint64_t texels = uint64_t{kImageLayers} * index_.width() * index_.height();
+    LL_RETURN_IF_ERROR(map_table_.create(context_, 4 * texels, 4, 0xff));
+    map_ = std::make_unique<LightmapMap>(index_.width(), index_.height(), std::span(map_table_.as<uint32_t>(), texels),
+                                         memory_);
+    LL_ASSIGN_OR_RETURN(image_,
+                        Image::create(context_, options_.image_format, index_.width(), index_.height(), kImageLayers));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status VulkanAsset::create_sets() {
+  const Pass image_pass = options_.image_format == VK_FORMAT_R32G32B32A32_SFLOAT ? Pass::kImage32 : Pass::kImage16;
+  const uint32_t F = context_->frames, pools = gpu::kMaxPools;
+  const DescriptorSets::Demand demands[] = {
+      {Pass::kDirect, F},    {Pass::kDirectShadowed, F}, {Pass::kRadiosity, F},   {Pass::kSelectProbes, 1},
+      {Pass::kMarkCells, 1}, {Pass::kSelectCells, 1},    {Pass::kSettle, 1},      {image_pass, 1},
+      {Pass::kMark, pools},  {Pass::kRelight, pools},    {Pass::kProject, pools}, {Pass::kReceive, 2 * pools}};
+  LL_ASSIGN_OR_RETURN(sets_, DescriptorSets::create(context_, pipelines_, demands));
+
+  const uint64_t slot_bytes = 4 * (uint64_t{index_.rays()} + tile_words_);
+  const PoolBindings bindings{&lambda_,
+                              &active_cells_,
+                              &control_,
+                              &irradiance_,
+                              options_.smoothing ? &target_ : nullptr,
+                              &slot_table_.device(),
+                              &changed_,
+                              &dirty_,
+                              &radiosity_,
+                              &sh_,
+                              &active_slots_};
+  relight_pools_ = std::make_unique<RelightPools>(context_, sets_.get(), bindings, slot_bytes,
+                                                  static_cast<uint32_t>(probes_.size()), memory_);
+  LL_RETURN_IF_ERROR(relight_pools_->check());
+  uint64_t cell_bytes = 0;
+  for (const AssetIndex::Cell& c : index_.cells()) cell_bytes += c.chunk.size + c.chunk.size / 8 + 1024;
+  cell_pools_ = std::make_unique<CellPools>(context_, sets_.get(), bindings, cell_bytes, memory_);
+  const uint64_t P = probes_.size(), per_pool = relight_pools_->pool_slots();
+  LL_ASSIGN_OR_RETURN(active_slots_,
+                      Buffer::create(context_, 4 * ((P + per_pool - 1) / per_pool * per_pool), BufferUse::kDevice));
+
+  for (uint32_t f = 0; f < F; ++f) {
+    LL_ASSIGN_OR_RETURN(const VkDescriptorSet radiosity, sets_->allocate(Pass::kRadiosity));
+    LL_ASSIGN_OR_RETURN(const VkDescriptorSet direct, sets_->allocate(Pass::kDirect));
+    LL_ASSIGN_OR_RETURN(const VkDescriptorSet shadowed, sets_->allocate(Pass::kDirectShadowed));
+    radiosity_sets_.push_back(radiosity);
+    direct_sets_.push_back(direct);
+    shadowed_sets_.push_back(shadowed);
+  }
+  bound_direct_.resize(F);
+  const VkDescriptorBufferInfo select_probes[] = {dirty_.whole(),   slot_table_.device().whole(),
+                                                  stamps_.whole(),  active_slots_.whole(),
+                                                  control_.whole(), slot_seen_.whole()};
+  LL_ASSIGN_OR_RETURN(select_probes_, sets_->make(Pass::kSelectProbes, select_probes));
+  const VkDescriptorBufferInfo cells = cell_table_.device().whole();
+  const VkDescriptorBufferInfo mark_cells[] = {cells, cell_probes_.whole(), stamps_.whole(), cell_dirty_.whole()};
+  LL_ASSIGN_OR_RETURN(mark_cells_, sets_->make(Pass::kMarkCells, mark_cells));
+  const VkDescriptorBufferInfo select_cells[] = {cells,
+                                                 cell_probes_.whole(),
+                                                 stamps_.whole(),
+                                                 cell_dirty_.whole(),
+                                                 active_cells_.whole(),
+                                                 control_.whole(),
+                                                 cell_seen_.whole()};
+  LL_ASSIGN_OR_RETURN(select_cells_, sets_->make(Pass::kSelectCells, select_cells));
+  if (target_.exists()) {
+    const VkDescriptorBufferInfo settle[] = {target_.whole(), irradiance_.whole()};
+    LL_ASSIGN_OR_RETURN(settle_, sets_->make(Pass::kSettle, settle));
+  }
+  if (map_ != nullptr) {
+    const VkDescriptorBufferInfo image[] = {map_table_.device().whole(), irradiance_.whole()};
+    const VkDescriptorImageInfo view{VK_NULL_HANDLE, image_.view(), VK_IMAGE_LAYOUT_GENERAL};
+    LL_ASSIGN_OR_RETURN(image_set_, sets_->make(image_pass, image, &view));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace lightloom

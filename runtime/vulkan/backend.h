@@ -1,0 +1,64 @@
+// The Vulkan passes behind the C API.
+#pragma once
+
+#include <memory>
+
+#include "runtime/vulkan/asset.h"
+#include "runtime/vulkan/own_queue.h"
+
+namespace lightloom {
+
+class VulkanBackend final : public Backend {
+ public:
+  /// `info` is checked; its defaults are not filled in. InvalidArgument, OutOfRange (a feature is missing),
+  /// ResourceExhausted.
+  static absl::StatusOr<std::unique_ptr<VulkanBackend>> create(const lightloom_vulkan_create_info& info,
+                                                               std::pmr::memory_resource* memory);
+  /// A device of its own, which it owns from then on (also if this fails), and update() and read_irradiance().
+  absl::Status own(const lightloom_vulkan_device& device);
+  ~VulkanBackend() override;
+
+  absl::Status load_manifest(std::span<const uint8_t> manifest) override;
+  void unload() override;
+  bool loaded() const override { return asset_ != nullptr; }
+  absl::Status for_each_chunk(absl::Status (*visit)(void* user, const Digest& digest, uint64_t size),
+                              void* user) const override;
+  absl::Status load_chunk(const Digest& digest, std::span<const uint8_t> bytes) override {
+    return asset_->load_chunk(digest, bytes);
+  }
+  absl::Status unload_chunk(const Digest& digest) override { return asset_->unload_chunk(digest); }
+  uint64_t surface_elements() const override { return asset_->index().surface_elements(); }
+  void set(SurfaceInput input, uint64_t first, std::span<const float> rgb) override { asset_->set(input, first, rgb); }
+  void set_environment(Vec3 radiance) override { asset_->set_environment(radiance); }
+  absl::Status set_options(const lightloom_update_options& options) override;
+  void reset_feedback() override { asset_->reset_feedback(); }
+  absl::Status update(uint32_t frames) override;
+  absl::Status read_irradiance(std::span<float> rgb) override;
+  lightloom_counts counts() const override;
+  lightloom_stats stats() const override;
+
+  // REQUIRES: loaded().
+  absl::Status record(VkCommandBuffer commands, const lightloom_frame_info& info, FrameKind kind = FrameKind::kWhole);
+  void fill_outputs(lightloom_vulkan_outputs* outputs) const { asset_->fill_outputs(outputs); }
+
+ private:
+  explicit VulkanBackend(std::pmr::memory_resource* memory) : memory_(memory) {}
+  absl::Status take(uint32_t frame);
+  absl::Status run_frames(uint32_t frames, FrameKind kind);
+
+  std::pmr::memory_resource* memory_;
+  Context context_;
+  AssetOptions asset_options_;
+  lightloom_vulkan_device own_device_{};
+  std::unique_ptr<OwnQueue> queue_;
+  std::unique_ptr<Pipelines> pipelines_;
+  std::unique_ptr<FrameMemory> frame_memory_;
+  std::unique_ptr<VulkanAsset> asset_;
+  lightloom_update_options options_{};
+  uint32_t frame_ = 0, taken_ = 0;  ///< the newest that is recorded, whose results are taken
+
+  mutable std::mutex stats_mutex_;
+  lightloom_stats stats_{};
+};
+
+}  // namespace lightloom
