@@ -19,7 +19,7 @@ namespace {
 constexpr const char* kSheet = "sheet";
 
 struct Options {
-  std::string scene, output, lightmap, lights, rig, camera, layer = "full", device = "vulkan";
+  std::string scene, output, lightmap, lights, rig, camera, layer = "full", device = "vulkan", direct;
   std::string albedo, emission, moving_light, light_path;
   StageOptions stage;
   int width = 960, samples = 4, frames = 1, reference_samples = 256;
@@ -62,6 +62,8 @@ absl::Status check(const Options& o) {
   if (o.frames < 1 || o.frames > 9999) return bad("--frames must be 1 to 9999");
   if (o.light_path.empty() != (o.frames == 1)) return bad("--frames N and --light-path x,y,z;x,y,z go together");
   if (!(o.exposure >= 0)) return bad("--exposure must be ≥ 0");
+  if (!o.direct.empty() && o.direct != "shadows" && o.direct != "rays") return bad("--direct must be shadows or rays");
+  if (o.direct == "shadows" && o.device == "cpu") return bad("--direct shadows needs --device vulkan");
   if (o.device != "vulkan" && o.device != "cpu") return bad("--device must be vulkan or cpu");
   return absl::OkStatus();
 }
@@ -118,6 +120,8 @@ void report(const Options& o, const Stage& stage) {
 absl::Status run(Options o) {
   LL_RETURN_IF_ERROR(check(o));
   o.stage.cpu = o.device == "cpu";
+  const bool rays = o.direct.empty() ? !o.lightmap.empty() : o.direct == "rays";
+  o.stage.direct = rays ? DirectSource::kRays : DirectSource::kShadowMaps;
   LL_ASSIGN_OR_RETURN(const Level level, load_level(o.scene, o.lights, o.rig, [&](Scene* scene) -> absl::Status {
                         LL_RETURN_IF_ERROR(set_albedo(o.albedo, scene));
                         return set_emission(o.emission, scene);
@@ -170,7 +174,10 @@ Command render_command() {
        {"--layer", "full, direct, indirect, E, albedo, or sheet: direct, full, path traced, 8 × difference", &o->layer},
        {"--exposure", "factor before the tone map; 0: from the (first) picture", &o->exposure},
        {"--shadow-size", "texels along a side of a shadow map; 0: by the number of lights", &o->stage.shadow_size},
-       {"--direct-samples", "points per texel where direct light is taken", &o->stage.direct_samples},
+       {"--direct", "direct light that bounces: shadows (maps) or rays; empty: rays with --lightmap, else shadows",
+        &o->direct},
+       {"--direct-samples", "points per texel where colour, and with --direct rays direct light, is taken",
+        &o->stage.direct_samples},
        {"--reference-samples", "paths per pixel, for --layer sheet", &o->reference_samples},
        {"--device", "vulkan, or cpu: no device, reference decoder and ray casting", &o->device},
        {"--validation", "run under the Vulkan validation layers", &o->stage.validation},

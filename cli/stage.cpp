@@ -2,6 +2,7 @@
 
 #include <chrono>
 
+#include "cli/live_stage.h"
 #include "core/asset/asset.h"
 #include "core/relight/camera_view.h"
 #include "core/relight/lightmap.h"
@@ -89,8 +90,10 @@ absl::StatusOr<std::unique_ptr<Stage>> Stage::create(const Level& level, const S
   std::unique_ptr<Stage> stage;
   if (options.cpu) {
     stage = std::make_unique<CpuStage>(level, options, bar);
-  } else {
+  } else if (options.direct == DirectSource::kRays) {
     stage = std::make_unique<VulkanStage>(level, options, bar);
+  } else {
+    LL_ASSIGN_OR_RETURN(stage, make_live_stage(level, options, bar));
   }
   LL_ASSIGN_OR_RETURN(stage->elements_, load_surface_elements(options.loom, manifest, *level.scene));
   return stage;

@@ -14,9 +14,17 @@
 
 namespace lightloom {
 
+/// Where the direct light that bounces comes from. What is seen directly comes from shadow maps with Vulkan, from rays
+/// on the CPU.
+enum class DirectSource {
+  kShadowMaps,  ///< the runtime's own pass over the renderer's shadow maps; Vulkan only
+  kRays         ///< traced on the CPU
+};
+
 struct StageOptions {
   std::string loom;
   int bounces = 16, direct_samples = 16, shadow_size = 0, threads = 0;
+  DirectSource direct = DirectSource::kShadowMaps;
   bool cpu = false, validation = false;
 };
 
