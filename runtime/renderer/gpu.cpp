@@ -188,7 +188,10 @@ absl::Status Gpu::run(const std::function<absl::Status(VkCommandBuffer)>& record
   auto begin = vulkan_struct<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
   begin.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
   LL_VK_RETURN_IF_ERROR("vkBeginCommandBuffer", vkBeginCommandBuffer(commands_, &begin));
-  LL_RETURN_IF_ERROR(record(commands_));
+  if (absl::Status recorded = record(commands_); !recorded.ok()) {
+    vkResetCommandBuffer(commands_, 0);
+    return recorded;
+  }
   LL_VK_RETURN_IF_ERROR("vkEndCommandBuffer", vkEndCommandBuffer(commands_));
   auto submit = vulkan_struct<VkSubmitInfo>(VK_STRUCTURE_TYPE_SUBMIT_INFO);
   submit.commandBufferCount = 1;

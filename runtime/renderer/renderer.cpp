@@ -41,6 +41,7 @@ absl::StatusOr<std::unique_ptr<Renderer>> Renderer::create(Gpu* gpu, const Scene
   LL_ASSIGN_OR_RETURN(ShadowMaps maps, ShadowMaps::create(*gpu, shadow_view_count(scene.lights), shadow_size));
   r->shadow_maps_ = std::make_unique<ShadowMaps>(std::move(maps));
   for (const Light& light : scene.lights) r->light_types_.push_back(light.type);
+  r->bounds_ = scene.bounds();
   LL_RETURN_IF_ERROR(r->make_frame_set());
   const Image dark(1, 1, {"R", "G", "B", "A"});
   LL_RETURN_IF_ERROR(r->set_irradiance(dark, dark));
@@ -130,7 +131,7 @@ absl::Status Renderer::update_lights() {
   const bool same = std::equal(scene_.lights.begin(), scene_.lights.end(), light_types_.begin(), light_types_.end(),
                                [](const Light& light, LightType type) { return light.type == type; });
   if (!same) return absl::FailedPreconditionError("lights came, went or changed their type; make a new renderer");
-  views_ = make_shadow_views(scene_.lights, scene_.bounds(), shadow_maps_->size());
+  views_ = make_shadow_views(scene_.lights, bounds_, shadow_maps_->size());
   copy(views_.lights, light_data_);
   copy(views_.views, view_data_);
   return absl::OkStatus();

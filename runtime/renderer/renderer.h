@@ -66,6 +66,7 @@ class Renderer {
   std::unique_ptr<ShadowMaps> shadow_maps_;
   ShadowViews views_;
   std::vector<LightType> light_types_;
+  Aabb bounds_;
   Buffer frame_data_, light_data_, view_data_;
   Texture2D irradiance_;
   Owned<VkSampler> nearest_;

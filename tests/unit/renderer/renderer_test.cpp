@@ -329,6 +329,14 @@ TEST(Renderer, TooLargeAPictureIsAnError) {
   EXPECT_EQ(image.status().code(), absl::StatusCode::kOutOfRange);
 }
 
+TEST(Renderer, AnErrorWhileRecordingLeavesItUsable) {
+  Drawn level(*builtin_scene("cornell"));
+  const auto fails = [](VkCommandBuffer) { return absl::AbortedError("no"); };
+  EXPECT_EQ(level.renderer().render(level.scene().cameras[0], {32, 1, Layer::kFull}, fails).status().code(),
+            absl::StatusCode::kAborted);
+  EXPECT_GT(mean_of(level.vulkan(Layer::kFull)).x, 0);
+}
+
 TEST(Renderer, ALevelWithoutLightsOrTrianglesIsDark) {
   Scene scene;
   scene.cameras.push_back(camera_at({0, 0, 0}, {0, 0, -1}, 0.8f));
