@@ -1,5 +1,7 @@
 #include "cli/scene_edit.h"
 
+#include <absl/strings/str_cat.h>
+
 #include <cmath>
 #include <functional>
 #include <map>
@@ -34,7 +36,7 @@ absl::Status edit_objects(const std::string& option, const std::string& edits, S
   for (const std::string& edit : split(edits, ';')) {
     const size_t colon = edit.rfind(':');
     if (colon == std::string::npos) {
-      return absl::InvalidArgumentError(option + " '" + edit + "' must be OBJECT:r,g,b");
+      return absl::InvalidArgumentError(absl::StrCat(option, " '", edit, "' must be OBJECT:r,g,b"));
     }
     const std::string name = edit.substr(0, colon);
     LL_ASSIGN_OR_RETURN(const Vec3 value, parse_vec3(edit.substr(colon + 1)));
@@ -45,7 +47,7 @@ absl::Status edit_objects(const std::string& option, const std::string& edits, S
       found = true;
       own_materials(&object, scene, [&](Material* m) { change(m, value); });
     }
-    if (!found) return absl::NotFoundError(option + ": the scene has no object '" + name + "'");
+    if (!found) return absl::NotFoundError(absl::StrCat(option, ": the scene has no object '", name, "'"));
   }
   return absl::OkStatus();
 }

@@ -7,8 +7,8 @@
 #include <cstdint>
 namespace lightloom::renderer::gpu {
 using uint = uint32_t;
-using vec4 = std::array<float, 4>;
-using mat4 = std::array<float, 16>;  // column-major
+using vec4 = std::array<float, 4>;   // NOLINT(readability-identifier-naming): as GLSL says
+using mat4 = std::array<float, 16>;  // NOLINT(readability-identifier-naming): column-major
 #define LL_CONSTANT inline constexpr
 #else
 #define LL_CONSTANT const
