@@ -7,7 +7,8 @@
 
 namespace lightloom {
 
-absl::StatusOr<Level> load_level(const std::string& path, const std::string& lights, const std::string& rig) {
+absl::StatusOr<Level> load_level(const std::string& path, const std::string& lights, const std::string& rig,
+                                 const std::function<absl::Status(Scene*)>& edit) {
   LL_ASSIGN_OR_RETURN(Scene scene, load_gltf(path));
   for (const std::string& warning : scene.warnings) std::fprintf(stderr, "warning: %s\n", warning.c_str());
   if (lights.empty() && !rig.empty()) {
@@ -21,6 +22,7 @@ absl::StatusOr<Level> load_level(const std::string& path, const std::string& lig
     LL_ASSIGN_OR_RETURN(const Rig chosen, rig.empty() ? absl::StatusOr<Rig>(rigs.front()) : find_rig(rigs, rig));
     LL_RETURN_IF_ERROR(apply_rig(chosen, &scene));
   }
+  if (edit) LL_RETURN_IF_ERROR(edit(&scene));
   Level level;
   level.scene = std::make_unique<Scene>(std::move(scene));
   LL_ASSIGN_OR_RETURN(level.tracer, RayTracer::create(*level.scene));

@@ -1,6 +1,7 @@
 // What several commands do first: load a level, put a rig of lights in it, and lay out its lightmap.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -17,8 +18,10 @@ struct Level {
   std::unique_ptr<RayTracer> tracer;
 };
 
-/// `lights` empty: the lights of the glTF. Warnings of the scene go to stderr.
-absl::StatusOr<Level> load_level(const std::string& path, const std::string& lights = "", const std::string& rig = "");
+/// `lights` empty: the lights of the glTF. `edit` changes the scene before the ray tracer sees it. Warnings of the scene
+/// go to stderr.
+absl::StatusOr<Level> load_level(const std::string& path, const std::string& lights = "", const std::string& rig = "",
+                                 const std::function<absl::Status(Scene*)>& edit = nullptr);
 
 /// The scene's camera of that name, or its first one if the name is empty.
 absl::StatusOr<Camera> find_camera(const Scene& scene, const std::string& name);

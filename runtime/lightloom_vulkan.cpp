@@ -45,17 +45,17 @@ lightloom_result with_vulkan_asset(lightloom_runtime* runtime, Body body) noexce
 }
 
 lightloom_result create_on_cpu(const lightloom_create_info& info, lightloom_runtime** out) {
-  return make_runtime(info.allocator, {info.message, info.message_user}, out,
-                      [&](lightloom_runtime* runtime) -> absl::Status {
-                        if ((info.flags & ~(LIGHTLOOM_CREATE_CPU | LIGHTLOOM_CREATE_SMOOTHING)) != 0 || info.reserved != 0) {
-                          return absl::InvalidArgumentError(
-                              "beside LIGHTLOOM_CREATE_CPU only LIGHTLOOM_CREATE_SMOOTHING may be set, and reserved must be 0");
-                        }
-                        runtime->backend = std::make_unique<SimdBackend>(
-                            SimdBackend::Options{info.threads, (info.flags & LIGHTLOOM_CREATE_SMOOTHING) != 0, info.byte_budget},
-                            &runtime->memory);
-                        return absl::OkStatus();
-                      });
+  return make_runtime(
+      info.allocator, {info.message, info.message_user}, out, [&](lightloom_runtime* runtime) -> absl::Status {
+        if ((info.flags & ~(LIGHTLOOM_CREATE_CPU | LIGHTLOOM_CREATE_SMOOTHING)) != 0 || info.reserved != 0) {
+          return absl::InvalidArgumentError(
+              "beside LIGHTLOOM_CREATE_CPU only LIGHTLOOM_CREATE_SMOOTHING may be set, and reserved must be 0");
+        }
+        runtime->backend = std::make_unique<SimdBackend>(
+            SimdBackend::Options{info.threads, (info.flags & LIGHTLOOM_CREATE_SMOOTHING) != 0, info.byte_budget},
+            &runtime->memory);
+        return absl::OkStatus();
+      });
 }
 
 }  // namespace

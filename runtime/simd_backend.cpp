@@ -164,7 +164,8 @@ lightloom_counts SimdBackend::counts() const {
   out.gpu_bytes = c.bytes;
   out.byte_budget = options_.byte_budget;
   const std::lock_guard lock(mutex_);
-  out.resident_surfaces = static_cast<uint32_t>(std::count_if(keys_.begin(), keys_.end(), [](const auto& k) { return k != nullptr; }));
+  out.resident_surfaces =
+      static_cast<uint32_t>(std::count_if(keys_.begin(), keys_.end(), [](const auto& k) { return k != nullptr; }));
   return out;
 }
 

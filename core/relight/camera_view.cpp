@@ -15,6 +15,7 @@ Vec3 shade(const RayTracer& tracer, const SurfaceElements& elements, const Recei
   const Object& object = scene.objects[hit.object];
   const Triangle& t = object.triangles[hit.triangle];
   if (hit.back && !scene.materials[t.material].double_sided) return {};
+  if (layer == Layer::kAlbedo) return albedo_at(scene, object, t, hit.b1, hit.b2);
   Vec3 light;
   if (layer != Layer::kDirect) light += sample_irradiance(elements, search, irradiance, hit);
   if (layer == Layer::kE) return light / kPi;
@@ -44,34 +45,17 @@ absl::StatusOr<Image> render_view(const RayTracer& tracer, const SurfaceElements
             camera_direction(camera, (static_cast<float>(x) + jitter.u) / static_cast<float>(options.width),
                              (static_cast<float>(row) + jitter.v) / static_cast<float>(height));
         const Hit hit = tracer.closest(camera.position, direction);
-        sum += hit ? shade(tracer, elements, search, irradiance, hit, options.layer) : tracer.scene().environment;
+        if (hit) {
+          sum += shade(tracer, elements, search, irradiance, hit, options.layer);
+        } else if (shows_sky(options.layer)) {
+          sum += tracer.scene().environment;
+        }
       }
       image.set_rgb(x, static_cast<int>(row), sum / static_cast<float>(side * side));
     }
   });
   if (!done) return absl::CancelledError("cancelled while rendering");
   return image;
-}
-
-float expose(Image* image, float factor) {
-  if (factor <= 0) {
-    double sum = 0, count = 0;
-    for (int y = 0; y < image->height; ++y) {
-      for (int x = 0; x < image->width; ++x) {
-        const float luminance = dot(image->rgb(x, y), {0.2126f, 0.7152f, 0.0722f});
-        if (luminance > 0) sum += std::log(luminance), count += 1;
-      }
-    }
-    factor = count > 0 ? static_cast<float>(0.18 / std::exp(sum / count)) : 1;
-  }
-  for (int y = 0; y < image->height; ++y) {
-    for (int x = 0; x < image->width; ++x) {
-      const Vec3 v = image->rgb(x, y) * factor;
-      const auto map = [](float c) { return c * (1 + c / 16) / (1 + c); };
-      image->set_rgb(x, y, {map(v.x), map(v.y), map(v.z)});
-    }
-  }
-  return factor;
 }
 
 }  // namespace lightloom

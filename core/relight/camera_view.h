@@ -4,15 +4,9 @@
 #include <span>
 
 #include "core/relight/lightmap.h"
+#include "core/scene/picture.h"
 
 namespace lightloom {
-
-enum class Layer {
-  kFull,      ///< albedo/π·(direct + E) + emission
-  kDirect,    ///< albedo/π·direct + emission
-  kIndirect,  ///< albedo/π·E
-  kE          ///< E/π: white surfaces under the indirect light alone
-};
 
 struct ViewOptions {
   int width = 960;
@@ -21,12 +15,8 @@ struct ViewOptions {
   Parallel parallel;
 };
 
-/// Radiance, R, G, B; the sky where nothing is hit.
+/// The layer, R, G, B, height = width ÷ aspect.
 absl::StatusOr<Image> render_view(const RayTracer& tracer, const SurfaceElements& elements,
                                   std::span<const Vec3> irradiance, const Camera& camera, const ViewOptions& options);
-
-/// The one exposure and tone map of every picture this project writes: the image's log-average luminance (zeros left out)
-/// goes to 0.18, then x·(1 + x/16)/(1 + x) per channel (Reinhard et al. 2002, Eq. 4, white at 4). Returns the factor.
-float expose(Image* image, float factor = 0);
 
 }  // namespace lightloom

@@ -43,11 +43,11 @@ void dilate(Image* image) {
 
 }  // namespace
 
-Image lightmap_image(const SurfaceElements& elements, std::span<const Vec3> irradiance) {
+Image lightmap_image(const SurfaceElements& elements, std::span<const Vec3> irradiance, bool back) {
   Image image(elements.layout.width, elements.layout.height, {"R", "G", "B", "A", "area"});
   for (size_t i = 0; i < elements.receivers.all.size(); ++i) {
     const Receiver& r = elements.receivers.all[i];
-    if (r.back) continue;
+    if (r.back != back) continue;
     const Texel& texel = elements.receivers.grids[r.object].texels[r.texel];
     const int x = elements.layout.placements[r.object].x + static_cast<int>(texel.x);
     const int y = elements.layout.placements[r.object].y + static_cast<int>(texel.y);

@@ -78,13 +78,15 @@ absl::StatusOr<SurfaceElements> load_surface_elements(const std::filesystem::pat
   return out;
 }
 
-absl::StatusOr<SurfaceInputs> light_surfaces(const RayTracer& tracer, const SurfaceElements& elements, int samples,
-                                             const Parallel& parallel) {
-  const Scene& scene = tracer.scene();
+namespace {
+
+/// `tracer` null: no direct light.
+absl::StatusOr<SurfaceInputs> sample_surfaces(const RayTracer* tracer, const Scene& scene,
+                                              const SurfaceElements& elements, int samples, const Parallel& parallel) {
   const size_t n = elements.receivers.all.size();
   const uint32_t side = std::max(1u, static_cast<uint32_t>(std::sqrt(static_cast<float>(samples))));
   SurfaceInputs out;
-  out.direct.resize(n);
+  if (tracer) out.direct.resize(n);
   out.albedo.resize(n);
   out.emission.resize(n);
   const bool done = parallel_for(n, parallel, [&](uint64_t i) {
@@ -100,7 +102,9 @@ absl::StatusOr<SurfaceInputs> light_surfaces(const RayTracer& tracer, const Surf
     for (uint32_t s = 0; s < side * side; ++s) {
       const SurfacePoint p = sample_texel(object, uv, grid, texel, stratified(s, side, &rng), Footprint::kTexel, open);
       const Triangle& t = object.triangles[p.triangle];
-      out.direct[i] += direct_irradiance(tracer, shading_point(object, p.triangle, p.b1, p.b2, r.back)) * weight;
+      if (tracer) {
+        out.direct[i] += direct_irradiance(*tracer, shading_point(object, p.triangle, p.b1, p.b2, r.back)) * weight;
+      }
       out.albedo[i] += albedo_at(scene, object, t, p.b1, p.b2) * weight;
       if (!r.back) out.emission[i] += emission_at(scene, object, t, p.b1, p.b2) * weight;
     }
@@ -109,6 +113,18 @@ absl::StatusOr<SurfaceInputs> light_surfaces(const RayTracer& tracer, const Surf
   for (Vec3& a : out.albedo) a = {std::min(a.x, 1.0f), std::min(a.y, 1.0f), std::min(a.z, 1.0f)};
   if (!done) return absl::CancelledError("cancelled while lighting surfaces");
   return out;
+}
+
+}  // namespace
+
+absl::StatusOr<SurfaceInputs> surface_materials(const Scene& scene, const SurfaceElements& elements, int samples,
+                                                const Parallel& parallel) {
+  return sample_surfaces(nullptr, scene, elements, samples, parallel);
+}
+
+absl::StatusOr<SurfaceInputs> light_surfaces(const RayTracer& tracer, const SurfaceElements& elements, int samples,
+                                             const Parallel& parallel) {
+  return sample_surfaces(&tracer, tracer.scene(), elements, samples, parallel);
 }
 
 }  // namespace lightloom

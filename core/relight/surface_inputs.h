@@ -29,6 +29,10 @@ struct SurfaceInputs {
   std::vector<Vec3> emission;  ///< radiance
 };
 
+/// Albedo and emission alone; `direct` stays empty. Averages over `samples` points of each texel.
+absl::StatusOr<SurfaceInputs> surface_materials(const Scene& scene, const SurfaceElements& elements, int samples,
+                                                const Parallel& parallel);
+
 /// Averages over `samples` points of each texel.
 absl::StatusOr<SurfaceInputs> light_surfaces(const RayTracer& tracer, const SurfaceElements& elements, int samples,
                                              const Parallel& parallel);

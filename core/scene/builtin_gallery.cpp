@@ -219,7 +219,7 @@ Scene make_gallery() {
   spot.inner_cone_angle = 0.25f;
   spot.outer_cone_angle = 0.4f;
   s.light(spot);
-  s.camera("hall", {middle(1) - 3.6f, 1.7f, middle(1) - 3.2f}, {middle(1) + 2, 1.4f, middle(1) + 2}, 1.1f, 16.0f / 9);
+  s.camera("hall", {middle(1) - 3.7f, 1.7f, middle(1) - 1.4f}, {middle(1) + 2, 1.5f, middle(1) + 1}, 1.1f, 16.0f / 9);
   s.camera("enfilade", {0.8f, 1.7f, middle(1)}, {line(kColumns), 1.5f, middle(1)}, 0.9f, 16.0f / 9);
   return s.finish();
 }

@@ -39,7 +39,7 @@ absl::Status VulkanAsset::load_chunk(const Digest& digest, std::span<const uint8
     const std::lock_guard lock(mutex_);
     const bool resident = target.kind == AssetIndex::Kind::kSurface   ? surfaces_[target.index].keys != nullptr
                           : target.kind == AssetIndex::Kind::kRelight ? probes_[target.index].resident
-                                                                       : cells_[target.index].resident;
+                                                                      : cells_[target.index].resident;
     if (resident) return absl::OkStatus();
   }
   switch (target.kind) {

@@ -36,15 +36,19 @@ function reach(file,    i) {
   for (i = 1; i <= n_included[file]; i++) reach(included[file, i])
 }
 
-function judge(file, folder,    n, i, list, other) {
+function judge(file,    folder, n, i, list, other) {
   split("", reached)
   reach(file)
-  n = split(never[folder], list, " ")
-  for (other in reached) {
-    for (i = 1; i <= n; i++)
+  for (folder in never) {
+    if (!governs(folder, file, never)) continue
+    n = split(never[folder], list, " ")
+    for (other in reached) for (i = 1; i <= n; i++)
       if ((other, list[i]) in uses)
         broken(uses[other, list[i]] ": " list[i] " must not reach " folder "/" (other == file ? "" : " (" file " includes it)"))
-    if (folder in only && !inside_any(other, only[folder]))
+  }
+  for (folder in only) {
+    if (!governs(folder, file, only)) continue
+    for (other in reached) if (!inside_any(other, only[folder]))
       broken(file ": includes " other "; " folder "/ may use of ours only: " only[folder])
   }
 }
@@ -52,8 +56,7 @@ function judge(file, folder,    n, i, list, other) {
 END {
   if (unusable) exit 2
   for (f = 1; f <= n_files; f++) {
-    for (folder in never) if (inside(files[f], folder)) { judge(files[f], folder); judged[f] = 1 }
-    for (folder in only) if (!(f in judged) && inside(files[f], folder)) judge(files[f], folder)
+    judge(files[f])
     for (thing in once) if ((files[f], thing) in uses) {
       part = files[f]
       sub(/\/.*/, "", part)

@@ -14,6 +14,13 @@ function inside_any(path, folders,    n, i, list) {
   return 0
 }
 
+# Of the folders that have a rule and hold path, is this the innermost? Its rule alone counts.
+function governs(folder, path, rules,    other) {
+  if (!inside(path, folder)) return 0
+  for (other in rules) if (other != folder && inside(other, folder) && inside(path, other)) return 0
+  return 1
+}
+
 function rest(from,    i, text) {
   for (i = from; i <= NF; i++) text = text (i > from ? " " : "") $i
   return text
