@@ -141,7 +141,7 @@ absl::Status LiveStage::start() {
   asset.read_user = &store;
   LL_RETURN_IF_ERROR(messages_.status(lightloom_load(runtime, &asset)));
 
-  LL_ASSIGN_OR_RETURN(const SurfaceInputs inputs, surface_materials(scene, elements_, options_.direct_samples,
+  LL_ASSIGN_OR_RETURN(const SurfaceInputs inputs, surface_materials(*level_.tracer, elements_, options_.direct_samples,
                                                                     bar_->parallel("materials", options_.threads)));
   bar_->finish();
   const uint64_t n = inputs.albedo.size();

@@ -80,13 +80,13 @@ absl::StatusOr<SurfaceElements> load_surface_elements(const std::filesystem::pat
 
 namespace {
 
-/// `tracer` null: no direct light.
-absl::StatusOr<SurfaceInputs> sample_surfaces(const RayTracer* tracer, const Scene& scene,
-                                              const SurfaceElements& elements, int samples, const Parallel& parallel) {
+absl::StatusOr<SurfaceInputs> sample_surfaces(const RayTracer& tracer, const SurfaceElements& elements, int samples,
+                                              bool direct, const Parallel& parallel) {
+  const Scene& scene = tracer.scene();
   const size_t n = elements.receivers.all.size();
   const uint32_t side = std::max(1u, static_cast<uint32_t>(std::sqrt(static_cast<float>(samples))));
   SurfaceInputs out;
-  if (tracer) out.direct.resize(n);
+  if (direct) out.direct.resize(n);
   out.albedo.resize(n);
   out.emission.resize(n);
   const bool done = parallel_for(n, parallel, [&](uint64_t i) {
@@ -102,8 +102,8 @@ absl::StatusOr<SurfaceInputs> sample_surfaces(const RayTracer* tracer, const Sce
     for (uint32_t s = 0; s < side * side; ++s) {
       const SurfacePoint p = sample_texel(object, uv, grid, texel, stratified(s, side, &rng), Footprint::kTexel, open);
       const Triangle& t = object.triangles[p.triangle];
-      if (tracer) {
-        out.direct[i] += direct_irradiance(*tracer, shading_point(object, p.triangle, p.b1, p.b2, r.back)) * weight;
+      if (direct) {
+        out.direct[i] += direct_irradiance(tracer, shading_point(object, p.triangle, p.b1, p.b2, r.back)) * weight;
       }
       out.albedo[i] += albedo_at(scene, object, t, p.b1, p.b2) * weight;
       if (!r.back) out.emission[i] += emission_at(scene, object, t, p.b1, p.b2) * weight;
@@ -117,14 +117,14 @@ absl::StatusOr<SurfaceInputs> sample_surfaces(const RayTracer* tracer, const Sce
 
 }  // namespace
 
-absl::StatusOr<SurfaceInputs> surface_materials(const Scene& scene, const SurfaceElements& elements, int samples,
+absl::StatusOr<SurfaceInputs> surface_materials(const RayTracer& tracer, const SurfaceElements& elements, int samples,
                                                 const Parallel& parallel) {
-  return sample_surfaces(nullptr, scene, elements, samples, parallel);
+  return sample_surfaces(tracer, elements, samples, /*direct=*/false, parallel);
 }
 
 absl::StatusOr<SurfaceInputs> light_surfaces(const RayTracer& tracer, const SurfaceElements& elements, int samples,
                                              const Parallel& parallel) {
-  return sample_surfaces(&tracer, tracer.scene(), elements, samples, parallel);
+  return sample_surfaces(tracer, elements, samples, /*direct=*/true, parallel);
 }
 
 }  // namespace lightloom

@@ -30,7 +30,7 @@ struct SurfaceInputs {
 };
 
 /// Albedo and emission alone; `direct` stays empty. Averages over `samples` points of each texel.
-absl::StatusOr<SurfaceInputs> surface_materials(const Scene& scene, const SurfaceElements& elements, int samples,
+absl::StatusOr<SurfaceInputs> surface_materials(const RayTracer& tracer, const SurfaceElements& elements, int samples,
                                                 const Parallel& parallel);
 
 /// Averages over `samples` points of each texel.
