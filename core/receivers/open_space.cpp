@@ -15,7 +15,7 @@ Space classify(const RayTracer& tracer, const ShadingPoint& point, uint64_t seed
     count.add(tracer.closest(point.position, leave(point, square_to_cosine_hemisphere(uv.u, uv.v))));
     if (i + 1 == kFirstRays && (count.backs == 0 || count.backs == static_cast<int>(kFirstRays))) break;
   }
-  if (count.solid()) return Space::kSolid;
+  if (2 * count.backs >= count.rays) return Space::kSolid;
   return 8 * count.hits < count.rays ? Space::kVoid : Space::kOpen;
 }
 

@@ -20,13 +20,13 @@ struct FirstHits {
     if (hit.back) ++backs;
     nearest = std::min(nearest, hit.t);
   }
-  /// Misses count as open: a canopy over open ground is no solid.
-  bool solid() const { return rays > 0 && 2 * backs >= rays; }
+  /// For points anywhere: what a level's shell hides from them does not speak for them, so misses do not count.
+  bool solid() const { return hits > 0 && 2 * backs >= hits; }
 };
 
 enum class Space : uint8_t {
   kOpen,
-  kSolid,  ///< at least half of the rays meet a back first
+  kSolid,  ///< at least half of the rays meet a back first; misses are open: a canopy over open ground is no solid
   kVoid,   ///< fewer than an eighth of the rays hit anything
 };
 
