@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <mutex>
 #include <string>
 #include <vector>
@@ -38,6 +39,7 @@ class TestRuntime {
     lightloom_create_info info{};
     info.struct_size = sizeof info;
     info.flags = LIGHTLOOM_CREATE_VALIDATION | flags;
+    if (std::getenv("LIGHTLOOM_GPU_ASSISTED") != nullptr) info.flags |= LIGHTLOOM_CREATE_GPU_ASSISTED;
     info.message = Received::add;
     info.message_user = &received_;
     info.page_bytes = page_bytes;
