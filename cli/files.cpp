@@ -1,7 +1,10 @@
 #include "cli/files.h"
 
 #include <algorithm>
+#include <charconv>
+#include <cstdint>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <system_error>
 
 #include "core/base/file.h"
@@ -16,6 +19,43 @@ bool same_file(const fs::path& a, const fs::path& b) {
   if (fs::equivalent(a, b, error)) return true;
   const fs::path canonical_a = fs::weakly_canonical(a, error), canonical_b = fs::weakly_canonical(b, error);
   return !error && canonical_a == canonical_b;
+}
+
+std::string percent_decoded(const std::string& uri) {
+  std::string out;
+  for (size_t i = 0; i < uri.size(); ++i) {
+    unsigned byte = 0;
+    const char* digits = uri.data() + i + 1;
+    if (uri[i] == '%' && i + 2 < uri.size() && std::from_chars(digits, digits + 2, byte, 16).ptr == digits + 2) {
+      out += static_cast<char>(byte);
+      i += 2;
+    } else {
+      out += uri[i];
+    }
+  }
+  return out;
+}
+
+/// Buffers and textures beside a .gltf. Whatever cannot be read names nothing: the loader will say why.
+std::vector<std::string> linked_files(const std::string& gltf) {
+  constexpr uintmax_t kMaxBytes = uintmax_t{256} << 20;
+  std::error_code error;
+  if (!gltf.ends_with(".gltf") || fs::file_size(gltf, error) > kMaxBytes || error) return {};
+  const auto bytes = read_file(gltf);
+  if (!bytes.ok()) return {};
+  using Json = nlohmann::json;
+  std::vector<std::string> files;
+  std::string key;
+  const auto collect = [&](int, Json::parse_event_t event, Json& parsed) {
+    if (event == Json::parse_event_t::key) key = parsed.get<std::string>();
+    if (event == Json::parse_event_t::value && key == "uri" && parsed.is_string()) {
+      const auto uri = parsed.get<std::string>();
+      if (!uri.starts_with("data:")) files.push_back((fs::path(gltf).parent_path() / percent_decoded(uri)).string());
+    }
+    return event != Json::parse_event_t::value;  // nothing is kept
+  };
+  [[maybe_unused]] const Json nothing = Json::parse(bytes->begin(), bytes->end(), collect, /*allow_exceptions=*/false);
+  return files;
 }
 
 absl::Status missing(const std::string& path, const std::string& mend) {
@@ -49,6 +89,12 @@ absl::Status check_loom(const std::string& path) {
                                          ".loom folder that lightloom bake makes");
   }
   return absl::OkStatus();
+}
+
+OutputCheck::OutputCheck(std::vector<std::string> inputs) : used_(std::move(inputs)) {
+  for (size_t i = 0, n = used_.size(); i < n; ++i) {
+    for (std::string& linked : linked_files(used_[i])) used_.push_back(std::move(linked));
+  }
 }
 
 absl::Status OutputCheck::unused(const std::string& option, const std::string& path) {

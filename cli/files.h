@@ -17,8 +17,8 @@ absl::Status check_loom(const std::string& path);
 
 class OutputCheck {
  public:
-  /// `inputs`: files and .loom folders that the command reads; empty names are skipped.
-  explicit OutputCheck(std::vector<std::string> inputs) : used_(std::move(inputs)) {}
+  /// `inputs`: files and .loom folders that the command reads; empty names are skipped. What a .gltf links to counts too.
+  explicit OutputCheck(std::vector<std::string> inputs);
 
   /// `option` is what the user calls it. The name must end in one of `suffixes`, and the file be none of the inputs and
   /// earlier outputs; what it replaces, if anything, is a regular file; its folder takes new files.

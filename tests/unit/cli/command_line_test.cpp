@@ -155,6 +155,13 @@ TEST_F(CommandLine, OutputsNeverReplaceInputs) {
   EXPECT_EQ(text_of(scene_), before);
 }
 
+TEST_F(CommandLine, OutputsNeverReplaceWhatALevelLinksTo) {
+  write(path("my wall.png"), "pixels");
+  write(path("level.gltf"), R"({"asset": {"version": "2.0"}, "images": [{"uri": "my%20wall.png"}]})");
+  fails(2, {"render", baked(), path("level.gltf"), "-o", path("my wall.png")}, "would replace");
+  EXPECT_EQ(text_of(path("my wall.png")), "pixels");
+}
+
 TEST_F(CommandLine, OutputsReplaceRegularFilesOnly) {
   ASSERT_EQ(::mkfifo(path("pipe.glb").c_str(), 0644), 0);
   fs::create_directory(path("folder.glb"));
