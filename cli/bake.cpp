@@ -5,10 +5,13 @@
 #include <memory>
 
 #include "cli/command.h"
+#include "cli/files.h"
 #include "cli/interrupt.h"
 #include "cli/level.h"
+#include "cli/print_json.h"
 #include "cli/progress.h"
 #include "core/bake/bake.h"
+#include "core/base/text.h"
 
 namespace lightloom {
 namespace {
@@ -46,7 +49,7 @@ nlohmann::json to_json(const BakeReport& r) {
 }
 
 void print(const std::string& output, const BakeReport& r) {
-  std::printf("%s: %s\n", output.c_str(), human_bytes(static_cast<double>(r.bytes_total)).c_str());
+  std::printf("%s: %s\n", escape_controls(output).c_str(), human_bytes(static_cast<double>(r.bytes_total)).c_str());
   std::printf(
       "  %llu receivers, %llu probes (%llu of them repairs), %llu clusters in %llu cells, %.1f coefficients a "
       "receiver\n",
@@ -63,7 +66,15 @@ void print(const std::string& output, const BakeReport& r) {
               r.rays_gather > 0 ? 100.0 * static_cast<double>(r.unseen) / static_cast<double>(r.rays_gather) : 0.0);
 }
 
+absl::Status check(const Options& o) {
+  LL_RETURN_IF_ERROR(check_params(o.params));
+  LL_RETURN_IF_ERROR(check_threads(o.threads));
+  LL_RETURN_IF_ERROR(check_input(o.scene));
+  return OutputCheck({o.scene}).loom("-o", o.output);
+}
+
 absl::Status run(const Options& o) {
+  cancel_on_interrupt();
   LL_ASSIGN_OR_RETURN(const Level level, load_level(o.scene));
   ProgressBar bar;
   BakeControl control;
@@ -75,7 +86,7 @@ absl::Status run(const Options& o) {
   LL_ASSIGN_OR_RETURN(const BakeReport report, bake(*level.tracer, o.params, o.output, control));
   bar.finish();
   if (o.json) {
-    std::printf("%s\n", to_json(report).dump().c_str());
+    print_json(to_json(report));
   } else {
     print(o.output, report);
   }
@@ -94,7 +105,7 @@ Command bake_command() {
            {"--spacing", "side of a probe cell, metres; 0: chosen from the level", &p.spacing},
            {"--order", "spherical harmonics order of the probes, 0 to 9", &p.order},
            {"--links", "probes that each receiver reads", &p.links},
-           {"--rays", "gather rays per receiver (rounded to a square number)", &p.rays},
+           {"--rays", "gather rays per receiver, rounded to a square number", &p.rays},
            {"--relight-rays", "rays of each probe at run time", &p.relight_rays},
            {"--max-rank", "most coefficients of a cluster", &p.max_rank},
            {"--threshold", "relative error at which a cluster's rank ends", &p.threshold},
@@ -104,6 +115,7 @@ Command bake_command() {
            {"--seed", "of all random numbers", &p.seed},
            {"--threads", "0: one per hardware thread", &o->threads},
            {"--json", "print the report as JSON", &o->json}},
+          [o] { return check(*o); },
           [o] { return run(*o); }};
 }
 

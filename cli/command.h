@@ -11,10 +11,13 @@
 
 namespace lightloom {
 
+inline constexpr int kMaxThreads = 1024;
+
 struct Option {
   std::string name;  ///< "SCENE" positional, "-o,--output" or "--bounces"
   std::string help;
-  std::variant<bool*, int*, uint64_t*, float*, std::string*> value;  ///< holds the default; bool: a flag
+  /// Holds the default; bool: a flag. Numbers are parsed whole, and are finite.
+  std::variant<bool*, int*, uint64_t*, float*, std::string*> value;
   bool required = false;
 };
 
@@ -22,6 +25,9 @@ struct Command {
   std::string name;
   std::string help;
   std::vector<Option> options;
+  /// What can be said before any work: values in range, inputs there, outputs writable. InvalidArgument: the command line
+  /// is at fault.
+  std::function<absl::Status()> check;
   std::function<absl::Status()> run;
 };
 
@@ -32,5 +38,8 @@ Command make_scene_command();
 Command reference_command();
 Command render_command();
 Command verify_command();
+
+/// Shared by the commands that have the option.
+absl::Status check_threads(int threads);
 
 }  // namespace lightloom

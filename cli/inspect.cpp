@@ -7,8 +7,11 @@
 #include <memory>
 
 #include "cli/command.h"
+#include "cli/files.h"
+#include "cli/print_json.h"
 #include "cli/progress.h"
 #include "core/asset/asset.h"
+#include "core/base/text.h"
 #include "core/scene/image.h"
 
 namespace lightloom {
@@ -29,9 +32,6 @@ Vec3 heat(float t) {
 
 /// The lightmap image, each receiver in the colour of its cluster's error or rank. Returns the value that is red.
 absl::StatusOr<float> write_heatmap(const Options& o, const Manifest& m) {
-  if (o.quantity != "error" && o.quantity != "rank" && o.quantity != "probes") {
-    return absl::InvalidArgumentError("--quantity must be error, rank or probes");
-  }
   const auto value = [&](const ClusterEntry& c) {
     return o.quantity == "error" ? c.error : static_cast<float>(o.quantity == "rank" ? c.rank : c.probes);
   };
@@ -69,6 +69,7 @@ struct Summary {
   uint64_t receivers = 0, bytes = 0, relight = 0, surface = 0, cell = 0;
   double coefficients = 0, probes_per_cluster = 0, error2 = 0, unseen = 0;
   uint32_t max_rank = 0;
+  uint64_t above_threshold = 0;  ///< clusters whose error stays above the threshold at the greatest rank
 };
 
 Summary summarise(const Manifest& m) {
@@ -83,6 +84,7 @@ Summary summarise(const Manifest& m) {
     s.probes_per_cluster += c.probes;
     s.error2 += static_cast<double>(c.error) * c.error * c.receivers;
     s.max_rank = std::max(s.max_rank, c.rank);
+    s.above_threshold += c.error > m.params.threshold;
   }
   for (const ProbeEntry& p : m.probes) s.relight += p.relight.size;
   for (const ObjectEntry& o : m.objects) s.surface += o.surface.size;
@@ -118,6 +120,7 @@ nlohmann::json to_json(const Manifest& m, const Summary& s, bool with_cells) {
       {"clusters", m.clusters.size()},
       {"coefficients_per_receiver", s.coefficients},
       {"probes_per_cluster", s.probes_per_cluster},
+      {"clusters_above_threshold", s.above_threshold},
       {"error", std::sqrt(s.error2)},
       {"unseen_fraction", s.unseen},
       {"bytes", {{"total", s.bytes}, {"cells", s.cell}, {"relight", s.relight}, {"surfaces", s.surface}}}};
@@ -138,10 +141,10 @@ nlohmann::json to_json(const Manifest& m, const Summary& s, bool with_cells) {
 }
 
 void print(const Options& o, const Manifest& m, const Summary& s) {
-  std::printf("%s: %s (cells %s, relight sets %s, surfaces %s), method %s\n", o.loom.c_str(),
+  std::printf("%s: %s (cells %s, relight sets %s, surfaces %s), method %s\n", escape_controls(o.loom).c_str(),
               human_bytes(static_cast<double>(s.bytes)).c_str(), human_bytes(static_cast<double>(s.cell)).c_str(),
               human_bytes(static_cast<double>(s.relight)).c_str(), human_bytes(static_cast<double>(s.surface)).c_str(),
-              m.method_version.c_str());
+              printable(m.method_version).c_str());
   std::printf("  level     %zu objects, %.1f × %.1f × %.1f m, lightmap %d×%d\n", m.objects.size(),
               static_cast<double>(m.bounds.size().x), static_cast<double>(m.bounds.size().y),
               static_cast<double>(m.bounds.size().z), m.width, m.height);
@@ -151,6 +154,9 @@ void print(const Options& o, const Manifest& m, const Summary& s) {
               m.cells.size(), m.clusters.size());
   std::printf("  rank      %.1f coefficients a receiver (most %u), %.1f probes a cluster\n", s.coefficients, s.max_rank,
               s.probes_per_cluster);
+  std::printf("  threshold %llu of %zu clusters end above %.3g: --max-rank %d keeps them there\n",
+              static_cast<unsigned long long>(s.above_threshold), m.clusters.size(),
+              static_cast<double>(m.params.threshold), m.params.max_rank);
   std::printf("  quality   truncation error %.4f, unseen %.4f %%\n", std::sqrt(s.error2), 100 * s.unseen);
   if (!o.cells) return;
   std::printf("  %5s %18s %9s %8s %6s %8s %8s %10s  chunk\n", "level", "cell", "receivers", "clusters", "probes",
@@ -164,18 +170,26 @@ void print(const Options& o, const Manifest& m, const Summary& s) {
   }
 }
 
+absl::Status check(const Options& o) {
+  if (o.quantity != "error" && o.quantity != "rank" && o.quantity != "probes") {
+    return absl::InvalidArgumentError("--quantity must be error, rank or probes");
+  }
+  LL_RETURN_IF_ERROR(check_loom(o.loom));
+  return o.heatmap.empty() ? absl::OkStatus() : OutputCheck({}).file("--heatmap", o.heatmap, {".png"});
+}
+
 absl::Status run(const Options& o) {
   LL_ASSIGN_OR_RETURN(const Manifest m, read_manifest(o.loom));
   const Summary s = summarise(m);
   if (o.json) {
-    std::printf("%s\n", to_json(m, s, o.cells).dump().c_str());
+    print_json(to_json(m, s, o.cells));
   } else {
     print(o, m, s);
   }
   if (!o.heatmap.empty()) {
     LL_ASSIGN_OR_RETURN(const float top, write_heatmap(o, m));
     if (!o.json)
-      std::printf("  %s: %s per cluster, blue 0 to red %.4g\n", o.heatmap.c_str(), o.quantity.c_str(),
+      std::printf("  %s: %s per cluster, blue 0 to red %.4g\n", escape_controls(o.heatmap).c_str(), o.quantity.c_str(),
                   static_cast<double>(top));
   }
   return absl::OkStatus();
@@ -192,6 +206,7 @@ Command inspect_command() {
            {"--heatmap", "PNG of the lightmap to write, coloured by cluster", &o->heatmap},
            {"--quantity", "what the heat map shows: error, rank or probes", &o->quantity},
            {"--json", "print as JSON", &o->json}},
+          [o] { return check(*o); },
           [o] { return run(*o); }};
 }
 

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cstring>
 
+#include "cli/interrupt.h"
 #include "core/asset/asset.h"
 #include "core/base/file.h"
 #include "core/relight/lightmap.h"
@@ -55,6 +56,7 @@ class LiveStage : public Stage {
     // The last frame is recorded together with the next picture.
     waiting_ = options_.bounces > 0;
     for (int i = 1; i < options_.bounces; ++i) {
+      LL_RETURN_IF_ERROR(not_interrupted());
       LL_RETURN_IF_ERROR(renderer_->update_lights());
       LL_RETURN_IF_ERROR(gpu_->run([&](VkCommandBuffer commands) {
         if (i == 1) renderer_->record_shadows(commands);
@@ -163,6 +165,7 @@ absl::Status LiveStage::upload() {
   lightloom_counts counts{};
   counts.struct_size = sizeof counts;
   do {
+    LL_RETURN_IF_ERROR(not_interrupted());
     LL_RETURN_IF_ERROR(gpu_->run([this](VkCommandBuffer commands) {
       return messages_.status(lightloom_vulkan_record(runtime_.get(), commands, nullptr));
     }));

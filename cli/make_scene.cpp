@@ -3,6 +3,8 @@
 #include <memory>
 
 #include "cli/command.h"
+#include "cli/files.h"
+#include "core/base/text.h"
 #include "core/scene/builtin.h"
 #include "core/scene/gltf.h"
 
@@ -19,10 +21,12 @@ std::string names() {
   return all;
 }
 
+absl::Status check(const Options& o) { return OutputCheck({}).file("-o", o.output, {".glb"}); }
+
 absl::Status run(const Options& o) {
   LL_ASSIGN_OR_RETURN(const Scene scene, builtin_scene(o.name));
   LL_RETURN_IF_ERROR(save_gltf(scene, o.output));
-  std::printf("%s: %zu objects, %llu triangles, %zu lights\n", o.output.c_str(), scene.objects.size(),
+  std::printf("%s: %zu objects, %llu triangles, %zu lights\n", escape_controls(o.output).c_str(), scene.objects.size(),
               static_cast<unsigned long long>(scene.triangle_count()), scene.lights.size());
   return absl::OkStatus();
 }
@@ -34,6 +38,7 @@ Command make_scene_command() {
   return {"make-scene",
           "Write a built-in level as .glb",
           {{"NAME", names(), &o->name, true}, {"-o,--output", ".glb to write", &o->output, true}},
+          [o] { return check(*o); },
           [o] { return run(*o); }};
 }
 

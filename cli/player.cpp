@@ -13,8 +13,8 @@
 namespace lightloom {
 namespace {
 
-absl::StatusOr<std::vector<Vec3>> play_cpu(const std::filesystem::path& loom, const SurfaceInputs& inputs,
-                                           Vec3 environment, int iterations) {
+absl::StatusOr<std::vector<Vec3>> play_decoder(const std::filesystem::path& loom, const SurfaceInputs& inputs,
+                                               Vec3 environment, int iterations) {
   LL_ASSIGN_OR_RETURN(const auto manifest, read_file(loom / "manifest"));
   const ChunkStore store = chunk_store(loom);
   LL_ASSIGN_OR_RETURN(const AssetSource source,
@@ -42,7 +42,7 @@ struct Messages {
   }
   absl::Status status(lightloom_result result) const {
     if (result == LIGHTLOOM_OK && validation == 0) return absl::OkStatus();
-    return absl::UnavailableError("Vulkan runtime: " + (error.empty() ? lightloom_result_string(result) : error));
+    return absl::UnavailableError("runtime: " + (error.empty() ? lightloom_result_string(result) : error));
   }
 };
 
@@ -58,14 +58,19 @@ int read_chunk(void* user, const uint8_t digest[32], uint64_t size, void* out) {
 
 const float* floats(const std::vector<Vec3>& v) { return reinterpret_cast<const float*>(v.data()); }
 
-absl::StatusOr<std::vector<Vec3>> play_vulkan(const std::filesystem::path& loom, const SurfaceInputs& inputs,
-                                              Vec3 environment, const PlayOptions& options, PlayTimes* times) {
+absl::StatusOr<std::vector<Vec3>> play_runtime(const std::filesystem::path& loom, const SurfaceInputs& inputs,
+                                               Vec3 environment, const PlayOptions& options, PlayTimes* times) {
   LL_ASSIGN_OR_RETURN(const auto manifest, read_file(loom / "manifest"));
   ChunkStore store = chunk_store(loom);
   Messages messages;
   lightloom_create_info create{};
   create.struct_size = sizeof create;
-  create.flags = options.validation ? static_cast<uint32_t>(LIGHTLOOM_CREATE_VALIDATION) : 0u;
+  if (options.player == Player::kSimd) {
+    create.flags = LIGHTLOOM_CREATE_CPU;
+    create.threads = static_cast<uint32_t>(options.threads);
+  } else if (options.validation) {
+    create.flags = LIGHTLOOM_CREATE_VALIDATION;
+  }
   create.message = Messages::receive;
   create.message_user = &messages;
   lightloom_runtime* raw = nullptr;
@@ -102,8 +107,8 @@ absl::StatusOr<std::vector<Vec3>> play_vulkan(const std::filesystem::path& loom,
 
 absl::StatusOr<std::vector<Vec3>> play(const std::filesystem::path& loom, const SurfaceInputs& inputs, Vec3 environment,
                                        const PlayOptions& options, PlayTimes* times) {
-  return options.cpu ? play_cpu(loom, inputs, environment, options.iterations)
-                     : play_vulkan(loom, inputs, environment, options, times);
+  return options.player == Player::kDecoder ? play_decoder(loom, inputs, environment, options.iterations)
+                                            : play_runtime(loom, inputs, environment, options, times);
 }
 
 }  // namespace lightloom

@@ -9,13 +9,21 @@
 
 namespace lightloom {
 
-struct PlayOptions {
-  int iterations = 1;       ///< frames; each adds a bounce
-  bool cpu = false;         ///< the reference decoder in place of Vulkan
-  bool validation = false;  ///< Vulkan validation layers; any message is an error
+/// What computes E.
+enum class Player {
+  kVulkan,  ///< the runtime on a Vulkan device
+  kSimd,    ///< the runtime without a device, on the processor's vector units
+  kDecoder  ///< the reference decoder, in double precision
 };
 
-/// Milliseconds of the Vulkan passes, summed over the frames; 0 on the CPU.
+struct PlayOptions {
+  int iterations = 1;  ///< frames; each adds a bounce
+  Player player = Player::kVulkan;
+  bool validation = false;  ///< with kVulkan: its validation layers; any message is an error
+  int threads = 0;          ///< of kSimd; 0: one per hardware thread
+};
+
+/// Milliseconds of the runtime's passes, summed over the frames; 0 for the decoder.
 struct PlayTimes {
   double radiosity = 0, relight = 0, project = 0, receive = 0;
 };

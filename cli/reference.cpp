@@ -6,8 +6,12 @@
 #include <memory>
 
 #include "cli/command.h"
+#include "cli/files.h"
+#include "cli/interrupt.h"
 #include "cli/level.h"
+#include "cli/print_json.h"
 #include "cli/progress.h"
+#include "core/base/text.h"
 #include "core/reference/path_tracer.h"
 
 namespace lightloom {
@@ -21,14 +25,23 @@ struct Options {
   bool json = false;
 };
 
+absl::Status check(const Options& o) {
+  const auto bad = [](const std::string& what) { return absl::InvalidArgumentError(what); };
+  if (o.bounces < 0) return bad("--bounces must be ≥ 0");
+  if (o.samples < 2) return bad("--samples must be ≥ 2");
+  if (o.width < 1 || o.width > 16384) return bad("--width must be 1 to 16384");
+  if (o.footprint != "texel" && o.footprint != "cycles") return bad("--footprint must be texel or cycles");
+  if (o.lightmap_size < 0 || o.lightmap_size > kMaxLightmapSide) {
+    return bad("--lightmap-size must be 0 to " + std::to_string(kMaxLightmapSide));
+  }
+  if (!(o.texels_per_metre >= 0)) return bad("--texels-per-metre must be ≥ 0");
+  LL_RETURN_IF_ERROR(check_threads(o.threads));
+  LL_RETURN_IF_ERROR(check_level(o.scene, o.lights, o.rig));
+  return OutputCheck({o.scene, o.lights}).file("-o", o.output, {".exr"});
+}
+
 absl::Status run(const Options& o) {
-  if (o.bounces < 0 || o.samples < 2) {
-    return absl::InvalidArgumentError("--bounces must be ≥ 0 and --samples ≥ 2");
-  }
-  if (o.width < 1 || o.width > 16384) return absl::InvalidArgumentError("--width must be 1 to 16384");
-  if (o.footprint != "texel" && o.footprint != "cycles") {
-    return absl::InvalidArgumentError("--footprint must be texel or cycles");
-  }
+  cancel_on_interrupt();
   LL_ASSIGN_OR_RETURN(const Level level, load_level(o.scene, o.lights, o.rig));
   ProgressBar bar;
   ReferenceOptions options;
@@ -45,9 +58,15 @@ absl::Status run(const Options& o) {
     layout_options.lightmap_size = o.lightmap_size;
     layout_options.texels_per_metre = o.texels_per_metre;
     LL_ASSIGN_OR_RETURN(const AtlasLayout layout, make_layout(*level.scene, layout_options));
+    if (layout.width == 0) {
+      return absl::FailedPreconditionError(o.scene +
+                                           " has no static object that receives a lightmap; give it one, or look "
+                                           "through a camera with --camera first");
+    }
     result = reference_lightmap(*level.tracer, layout, options);
   } else {
-    LL_ASSIGN_OR_RETURN(const Camera camera, find_camera(*level.scene, o.camera == "first" ? "" : o.camera));
+    LL_ASSIGN_OR_RETURN(const Camera camera,
+                        find_camera(*level.scene, o.camera == "first" ? "" : o.camera, o.scene, o.width));
     result = reference_camera(*level.tracer, camera, o.width, options);
   }
   LL_RETURN_IF_ERROR(result.status());
@@ -55,11 +74,10 @@ absl::Status run(const Options& o) {
   bar.finish();
   LL_RETURN_IF_ERROR(write_exr(result->image, o.output));
   if (o.json) {
-    const nlohmann::json out = {{"noise", result->noise}, {"seconds", seconds}};
-    std::printf("%s\n", out.dump().c_str());
+    print_json({{"noise", result->noise}, {"seconds", seconds}});
   } else {
-    std::printf("%s: %dx%d, %d bounces, noise %.4f (rel_rmse), %s\n", o.output.c_str(), result->image.width,
-                result->image.height, o.bounces, result->noise, human_seconds(seconds).c_str());
+    std::printf("%s: %dx%d, %d bounces, noise %.4f (rel_rmse), %s\n", escape_controls(o.output).c_str(),
+                result->image.width, result->image.height, o.bounces, result->noise, human_seconds(seconds).c_str());
   }
   return absl::OkStatus();
 }
@@ -76,7 +94,7 @@ Command reference_command() {
        {"--lights", "lights.json that replaces the level's lights", &o->lights},
        {"--rig", "which rig of --lights", &o->rig},
        {"--bounces", "surfaces that light is reflected at on its way", &o->bounces},
-       {"--samples", "paths per texel or pixel", &o->samples},
+       {"--samples", "paths per texel or pixel; each half is rounded down to a square number", &o->samples},
        {"--lightmap-size", "side of the scene atlas, texels; 0: from --texels-per-metre", &o->lightmap_size},
        {"--texels-per-metre", "lightmap density; 0: chosen from the scene", &o->texels_per_metre},
        {"--camera", "render this camera ('first': the first one) in place of the lightmap", &o->camera},
@@ -85,6 +103,7 @@ Command reference_command() {
        {"--seed", "of the random numbers", &o->seed},
        {"--threads", "0: one per hardware thread", &o->threads},
        {"--json", "print the result as JSON", &o->json}},
+      [o] { return check(*o); },
       [o] { return run(*o); }};
 }
 

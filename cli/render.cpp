@@ -7,11 +7,15 @@
 #include <optional>
 
 #include "cli/command.h"
+#include "cli/files.h"
+#include "cli/interrupt.h"
 #include "cli/level.h"
+#include "cli/print_json.h"
 #include "cli/progress.h"
 #include "cli/scene_edit.h"
 #include "cli/sheet.h"
 #include "cli/stage.h"
+#include "core/base/text.h"
 
 namespace lightloom {
 namespace {
@@ -40,32 +44,11 @@ absl::StatusOr<Layer> parse_layer(const std::string& name) {
   return layer->second;
 }
 
-absl::Status check(const Options& o) {
-  const auto bad = [](const char* what) { return absl::InvalidArgumentError(what); };
-  if (o.output.empty() && o.lightmap.empty()) return bad("give -o PICTURE or --lightmap E.exr, or both");
-  if (!o.output.empty() && !o.output.ends_with(".png") && !o.output.ends_with(".exr")) {
-    return bad("-o must end in .png or .exr");
-  }
-  if (o.layer == kSheet) {
-    if (!o.output.ends_with(".png")) return bad("--layer sheet is for eyes: -o must end in .png");
-  } else {
-    LL_RETURN_IF_ERROR(parse_layer(o.layer).status());
-  }
-  if (o.stage.bounces < 0 || o.stage.bounces > 1000) return bad("--bounces must be 0 to 1000");
-  if (o.width < 1 || o.width > 16384) return bad("--width must be 1 to 16384");
-  if (o.samples < 1 || o.samples > 1024) return bad("--samples must be 1 to 1024");
-  if (o.stage.direct_samples < 1) return bad("--direct-samples must be ≥ 1");
-  if (o.stage.shadow_size != 0 && (o.stage.shadow_size < 16 || o.stage.shadow_size > 16384)) {
-    return bad("--shadow-size must be 16 to 16384, or 0");
-  }
-  if (o.reference_samples < 2) return bad("--reference-samples must be ≥ 2");
-  if (o.frames < 1 || o.frames > 9999) return bad("--frames must be 1 to 9999");
-  if (o.light_path.empty() != (o.frames == 1)) return bad("--frames N and --light-path x,y,z;x,y,z go together");
-  if (!(o.exposure >= 0)) return bad("--exposure must be ≥ 0");
-  if (!o.direct.empty() && o.direct != "shadows" && o.direct != "rays") return bad("--direct must be shadows or rays");
-  if (o.direct == "shadows" && o.device == "cpu") return bad("--direct shadows needs --device vulkan");
-  if (o.device != "vulkan" && o.device != "cpu") return bad("--device must be vulkan or cpu");
-  return absl::OkStatus();
+absl::StatusOr<Player> parse_device(const std::string& name) {
+  if (name == "vulkan") return Player::kVulkan;
+  if (name == "simd") return Player::kSimd;
+  if (name == "cpu") return Player::kDecoder;
+  return absl::InvalidArgumentError("--device must be vulkan, simd or cpu");
 }
 
 /// F.png → F_0007.png
@@ -76,10 +59,52 @@ std::string numbered(const std::string& path, int frame) {
   return path.substr(0, dot) + number + path.substr(dot);
 }
 
+absl::Status check_files(const Options& o) {
+  LL_RETURN_IF_ERROR(check_loom(o.stage.loom));
+  LL_RETURN_IF_ERROR(check_level(o.scene, o.lights, o.rig));
+  OutputCheck outputs({o.scene, o.lights, o.stage.loom});
+  for (int frame = 0; frame < o.frames; ++frame) {
+    const auto name = [&](const std::string& file) { return o.frames > 1 ? numbered(file, frame) : file; };
+    if (!o.output.empty()) LL_RETURN_IF_ERROR(outputs.file("-o", name(o.output), {".png", ".exr"}));
+    if (!o.lightmap.empty()) LL_RETURN_IF_ERROR(outputs.file("--lightmap", name(o.lightmap), {".exr"}));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status check(const Options& o) {
+  const auto bad = [](const char* what) { return absl::InvalidArgumentError(what); };
+  if (o.output.empty() && o.lightmap.empty()) return bad("give -o PICTURE or --lightmap E.exr, or both");
+  if (!o.output.empty() && !o.output.ends_with(".png") && !o.output.ends_with(".exr")) {
+    return bad("-o must end in .png or .exr");
+  }
+  if (!o.lightmap.empty() && !o.lightmap.ends_with(".exr")) return bad("--lightmap must end in .exr");
+  if (o.layer == kSheet) {
+    if (!o.output.ends_with(".png")) return bad("--layer sheet is for eyes: -o must end in .png");
+  } else {
+    LL_RETURN_IF_ERROR(parse_layer(o.layer).status());
+  }
+  if (o.stage.bounces < 0 || o.stage.bounces > 1000) return bad("--bounces must be 0 to 1000");
+  if (o.width < 1 || o.width > 16384) return bad("--width must be 1 to 16384");
+  if (o.samples < 1 || o.samples > 1024) return bad("--samples must be 1 to 1024");
+  if (o.stage.direct_samples < 1 || o.stage.direct_samples > 65536) return bad("--direct-samples must be 1 to 65536");
+  if (o.stage.shadow_size != 0 && (o.stage.shadow_size < 16 || o.stage.shadow_size > 16384)) {
+    return bad("--shadow-size must be 16 to 16384, or 0");
+  }
+  if (o.reference_samples < 2) return bad("--reference-samples must be ≥ 2");
+  if (o.frames < 1 || o.frames > 9999) return bad("--frames must be 1 to 9999");
+  if (o.light_path.empty() != (o.frames == 1)) return bad("--frames N and --light-path x,y,z;x,y,z go together");
+  if (!(o.exposure >= 0)) return bad("--exposure must be ≥ 0");
+  if (!o.direct.empty() && o.direct != "shadows" && o.direct != "rays") return bad("--direct must be shadows or rays");
+  LL_RETURN_IF_ERROR(parse_device(o.device).status());
+  if (o.direct == "shadows" && o.device != "vulkan") return bad("--direct shadows needs --device vulkan");
+  if (o.stage.validation && o.device != "vulkan") return bad("--validation needs --device vulkan");
+  LL_RETURN_IF_ERROR(check_threads(o.stage.threads));
+  return check_files(o);
+}
+
 /// `exposure` 0: chosen from this picture, and kept for those that follow.
-absl::Status write_picture(const Options& o, const Level& level, Stage* stage, const std::string& path, float* exposure,
-                           ProgressBar* bar) {
-  LL_ASSIGN_OR_RETURN(const Camera camera, find_camera(*level.scene, o.camera));
+absl::Status write_picture(const Options& o, const Level& level, const Camera& camera, Stage* stage,
+                           const std::string& path, float* exposure, ProgressBar* bar) {
   Image image;
   if (o.layer == kSheet) {
     const SheetOptions sheet{o.width, o.samples, o.stage.bounces, o.reference_samples,
@@ -92,40 +117,48 @@ absl::Status write_picture(const Options& o, const Level& level, Stage* stage, c
     if (path.ends_with(".exr")) return write_exr(image, path);
     if (layer != Layer::kAlbedo) *exposure = expose(&image, *exposure);
   }
-  if (!o.json) std::printf("%s: exposure %.4g\n", path.c_str(), static_cast<double>(*exposure));
+  if (!o.json) std::printf("%s: exposure %.4g\n", escape_controls(path).c_str(), static_cast<double>(*exposure));
   return write_png(image, path);
 }
 
 void report(const Options& o, const Stage& stage) {
   const PlayTimes& times = stage.times();
   const double frames = std::max(1, o.stage.bounces) * o.frames;
+  const bool timed = o.stage.player != Player::kDecoder;
   if (o.json) {
-    const nlohmann::json out = {{"receivers", stage.receivers()},
-                                {"frames", o.stage.bounces * o.frames},
-                                {"seconds", stage.seconds()},
-                                {"frame_ms",
-                                 {{"radiosity", times.radiosity / frames},
-                                  {"relight", times.relight / frames},
-                                  {"project", times.project / frames},
-                                  {"receive", times.receive / frames}}}};
-    std::printf("%s\n", out.dump().c_str());
+    nlohmann::json out = {
+        {"receivers", stage.receivers()}, {"frames", o.stage.bounces * o.frames}, {"seconds", stage.seconds()}};
+    if (timed) {
+      out["frame_ms"] = {{"radiosity", times.radiosity / frames},
+                         {"relight", times.relight / frames},
+                         {"project", times.project / frames},
+                         {"receive", times.receive / frames}};
+    }
+    print_json(out);
     return;
   }
-  std::printf("%s: %d frames on %s in %s; a frame: radiosity %.2f + relight %.2f + project %.2f + receive %.2f ms\n",
-              o.stage.loom.c_str(), o.stage.bounces * o.frames, o.device.c_str(),
-              human_seconds(stage.seconds()).c_str(), times.radiosity / frames, times.relight / frames,
-              times.project / frames, times.receive / frames);
+  std::printf("%s: %d frames on %s in %s", escape_controls(o.stage.loom).c_str(), o.stage.bounces * o.frames,
+              o.device.c_str(), human_seconds(stage.seconds()).c_str());
+  if (timed) {
+    std::printf("; a frame: radiosity %.2f + relight %.2f + project %.2f + receive %.2f ms", times.radiosity / frames,
+                times.relight / frames, times.project / frames, times.receive / frames);
+  }
+  std::printf("\n");
 }
 
 absl::Status run(Options o) {
-  LL_RETURN_IF_ERROR(check(o));
-  o.stage.cpu = o.device == "cpu";
+  cancel_on_interrupt();
+  LL_ASSIGN_OR_RETURN(o.stage.player, parse_device(o.device));
   const bool rays = o.direct.empty() ? !o.lightmap.empty() : o.direct == "rays";
   o.stage.direct = rays ? DirectSource::kRays : DirectSource::kShadowMaps;
   LL_ASSIGN_OR_RETURN(const Level level, load_level(o.scene, o.lights, o.rig, [&](Scene* scene) -> absl::Status {
                         LL_RETURN_IF_ERROR(set_albedo(o.albedo, scene));
                         return set_emission(o.emission, scene);
                       }));
+  Camera camera;
+  if (!o.output.empty()) {
+    LL_ASSIGN_OR_RETURN(camera, find_camera(*level.scene, o.camera, o.scene, o.width));
+  }
   std::optional<LightPath> path;
   if (!o.light_path.empty()) {
     LL_ASSIGN_OR_RETURN(path, LightPath::parse(o.moving_light, o.light_path, *level.scene));
@@ -134,15 +167,17 @@ absl::Status run(Options o) {
   LL_ASSIGN_OR_RETURN(const auto stage, Stage::create(level, o.stage, &bar));
   float exposure = o.exposure;
   for (int frame = 0; frame < o.frames; ++frame) {
+    LL_RETURN_IF_ERROR(not_interrupted());
     if (path) path->move(static_cast<float>(frame) / static_cast<float>(o.frames - 1), level.scene.get());
     LL_RETURN_IF_ERROR(stage->light());
+    LL_RETURN_IF_ERROR(not_interrupted());
     const auto name = [&](const std::string& file) { return path ? numbered(file, frame) : file; };
     if (!o.lightmap.empty()) {
       LL_ASSIGN_OR_RETURN(const Image e, stage->lightmap());
       LL_RETURN_IF_ERROR(write_exr(e, name(o.lightmap)));
     }
     if (!o.output.empty()) {
-      LL_RETURN_IF_ERROR(write_picture(o, level, stage.get(), name(o.output), &exposure, &bar));
+      LL_RETURN_IF_ERROR(write_picture(o, level, camera, stage.get(), name(o.output), &exposure, &bar));
     }
   }
   report(o, *stage);
@@ -170,7 +205,7 @@ Command render_command() {
        {"--bounces", "frames of feedback; each adds a bounce", &o->stage.bounces},
        {"--camera", "by name; empty: the first", &o->camera},
        {"--width", "pixels across", &o->width},
-       {"--samples", "samples per pixel", &o->samples},
+       {"--samples", "samples per pixel, rounded down to a square number", &o->samples},
        {"--layer", "full, direct, indirect, E, albedo, or sheet: direct, full, path traced, 8 × difference", &o->layer},
        {"--exposure", "factor before the tone map; 0: from the (first) picture", &o->exposure},
        {"--shadow-size", "texels along a side of a shadow map; 0: by the number of lights", &o->stage.shadow_size},
@@ -179,10 +214,15 @@ Command render_command() {
        {"--direct-samples", "points per texel where colour, and with --direct rays direct light, is taken",
         &o->stage.direct_samples},
        {"--reference-samples", "paths per pixel, for --layer sheet", &o->reference_samples},
-       {"--device", "vulkan, or cpu: no device, reference decoder and ray casting", &o->device},
+       {"--device",
+        "vulkan; simd: no device, the runtime on the processor; cpu: no device, the reference decoder. Without a "
+        "device "
+        "pictures are ray cast",
+        &o->device},
        {"--validation", "run under the Vulkan validation layers", &o->stage.validation},
        {"--threads", "0: one per hardware thread", &o->stage.threads},
        {"--json", "print the result as JSON", &o->json}},
+      [o] { return check(*o); },
       [o] { return run(*o); }};
 }
 

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <map>
 #include <sstream>
 
@@ -31,7 +32,7 @@ void own_materials(Object* object, Scene* scene, const std::function<void(Materi
   }
 }
 
-absl::Status edit_objects(const std::string& option, const std::string& edits, Scene* scene,
+absl::Status edit_objects(const std::string& option, const std::string& edits, float greatest, Scene* scene,
                           const std::function<void(Material*, Vec3)>& change) {
   for (const std::string& edit : split(edits, ';')) {
     const size_t colon = edit.rfind(':');
@@ -40,7 +41,12 @@ absl::Status edit_objects(const std::string& option, const std::string& edits, S
     }
     const std::string name = edit.substr(0, colon);
     LL_ASSIGN_OR_RETURN(const Vec3 value, parse_vec3(edit.substr(colon + 1)));
-    if (value.x < 0 || value.y < 0 || value.z < 0) return absl::InvalidArgumentError(option + ": a colour is negative");
+    for (int c = 0; c < 3; ++c) {
+      if (!(value[c] >= 0 && value[c] <= greatest)) {
+        return absl::InvalidArgumentError(
+            absl::StrCat(option, " '", edit, "': a colour must be ", greatest <= 1 ? "0 to 1" : "≥ 0"));
+      }
+    }
     bool found = false;
     for (Object& object : scene->objects) {
       if (object.name != name) continue;
@@ -67,7 +73,7 @@ absl::StatusOr<Vec3> parse_vec3(const std::string& text) {
 }
 
 absl::Status set_albedo(const std::string& edits, Scene* scene) {
-  return edit_objects("--set-albedo", edits, scene, [](Material* m, Vec3 albedo) {
+  return edit_objects("--set-albedo", edits, 1, scene, [](Material* m, Vec3 albedo) {
     m->base_color = albedo;
     // The texture of a masked material holds the mask, which is geometry: it stays and is multiplied.
     if (m->alpha_mode != AlphaMode::kMask) m->base_color_texture = -1;
@@ -75,10 +81,11 @@ absl::Status set_albedo(const std::string& edits, Scene* scene) {
 }
 
 absl::Status set_emission(const std::string& edits, Scene* scene) {
-  return edit_objects("--set-emission", edits, scene, [](Material* m, Vec3 radiance) {
-    m->emission = radiance;
-    m->emission_texture = -1;
-  });
+  return edit_objects("--set-emission", edits, std::numeric_limits<float>::max(), scene,
+                      [](Material* m, Vec3 radiance) {
+                        m->emission = radiance;
+                        m->emission_texture = -1;
+                      });
 }
 
 absl::StatusOr<LightPath> LightPath::parse(const std::string& light, const std::string& points, const Scene& scene) {

@@ -2,6 +2,7 @@
 
 #include <chrono>
 
+#include "cli/interrupt.h"
 #include "cli/live_stage.h"
 #include "core/asset/asset.h"
 #include "core/relight/camera_view.h"
@@ -20,9 +21,10 @@ class PlayedStage : public Stage {
     LL_ASSIGN_OR_RETURN(const SurfaceInputs inputs, light_surfaces(*level_.tracer, elements_, options_.direct_samples,
                                                                    bar_->parallel("direct light", options_.threads)));
     bar_->finish();
+    LL_RETURN_IF_ERROR(not_interrupted());
     const auto start = std::chrono::steady_clock::now();
     PlayTimes times;
-    const PlayOptions play_options{options_.bounces, options_.cpu, options_.validation};
+    const PlayOptions play_options{options_.bounces, options_.player, options_.validation, options_.threads};
     LL_ASSIGN_OR_RETURN(e_, play(options_.loom, inputs, level_.scene->environment, play_options, &times));
     seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     times_.radiosity += times.radiosity;
@@ -41,7 +43,7 @@ class PlayedStage : public Stage {
 };
 
 /// Without a Vulkan device: slow, and what the other is checked against.
-class CpuStage : public PlayedStage {
+class RayCastStage : public PlayedStage {
  public:
   using PlayedStage::PlayedStage;
 
@@ -88,8 +90,8 @@ absl::StatusOr<std::unique_ptr<Stage>> Stage::create(const Level& level, const S
                                                      ProgressBar* bar) {
   LL_ASSIGN_OR_RETURN(const Manifest manifest, read_manifest(options.loom));
   std::unique_ptr<Stage> stage;
-  if (options.cpu) {
-    stage = std::make_unique<CpuStage>(level, options, bar);
+  if (options.player != Player::kVulkan) {
+    stage = std::make_unique<RayCastStage>(level, options, bar);
   } else if (options.direct == DirectSource::kRays) {
     stage = std::make_unique<VulkanStage>(level, options, bar);
   } else {

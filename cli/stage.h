@@ -1,4 +1,4 @@
-// A lit level that pictures are taken of: drawn by Vulkan, or ray cast on the CPU.
+// A lit level that pictures are taken of: drawn by Vulkan, or ray cast on the processor.
 #pragma once
 
 #include <filesystem>
@@ -25,7 +25,8 @@ struct StageOptions {
   std::string loom;
   int bounces = 16, direct_samples = 16, shadow_size = 0, threads = 0;
   DirectSource direct = DirectSource::kShadowMaps;
-  bool cpu = false, validation = false;
+  Player player = Player::kVulkan;  ///< but kVulkan: pictures are ray cast, without a device
+  bool validation = false;
 };
 
 struct PictureInfo {

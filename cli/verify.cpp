@@ -2,28 +2,63 @@
 #include <nlohmann/json.hpp>
 
 #include <cstdio>
+#include <filesystem>
 #include <memory>
+#include <set>
+#include <system_error>
 
 #include "cli/command.h"
+#include "cli/files.h"
+#include "cli/print_json.h"
+#include "cli/progress.h"
 #include "core/asset/asset.h"
 #include "core/bake/plan.h"
+#include "core/base/text.h"
 #include "core/base/version.h"
 #include "core/scene/gltf.h"
 
 namespace lightloom {
 namespace {
 
+namespace fs = std::filesystem;
+
 struct Options {
   std::string loom, scene;
   bool json = false;
 };
 
-absl::Status check(const Options& o) {
+/// What lies in the chunk folder without being part of the asset: left by earlier or cancelled bakes.
+struct Orphans {
+  uint64_t files = 0, bytes = 0;
+};
+
+Orphans find_orphans(const fs::path& loom, const Manifest& m) {
+  std::set<fs::path> named;
+  const ChunkStore store = chunk_store(loom);
+  for (const CellEntry& c : m.cells) named.insert(store.path(c.chunk.digest));
+  for (const ProbeEntry& p : m.probes) named.insert(store.path(p.relight.digest));
+  for (const ObjectEntry& o : m.objects) named.insert(store.path(o.surface.digest));
+  Orphans orphans;
+  std::error_code error;
+  for (fs::recursive_directory_iterator it(loom / "chunks", error), end; !error && it != end; it.increment(error)) {
+    std::error_code unknown;
+    if (!it->is_regular_file(unknown) || named.contains(it->path())) continue;
+    ++orphans.files;
+    const uint64_t size = it->file_size(unknown);
+    if (!unknown) orphans.bytes += size;
+  }
+  return orphans;
+}
+
+absl::Status verify(const Options& o, Orphans* orphans) {
+  LL_RETURN_IF_ERROR(check_loom(o.loom));
+  if (!o.scene.empty()) LL_RETURN_IF_ERROR(check_input(o.scene));
   LL_RETURN_IF_ERROR(verify_asset(o.loom));
   LL_ASSIGN_OR_RETURN(const Manifest m, read_manifest(o.loom));
+  *orphans = find_orphans(o.loom, m);
   if (m.method_version != kMethodVersion) {
-    return absl::FailedPreconditionError(o.loom + " was baked by method version " + m.method_version + ", this is " +
-                                         std::string(kMethodVersion) + "; bake again");
+    return absl::FailedPreconditionError(o.loom + " was baked by method version " + printable(m.method_version) +
+                                         ", this is " + std::string(kMethodVersion) + "; bake again");
   }
   if (!o.scene.empty()) {
     LL_ASSIGN_OR_RETURN(const Scene scene, load_gltf(o.scene));
@@ -36,12 +71,19 @@ absl::Status check(const Options& o) {
 }
 
 absl::Status run(const Options& o) {
-  const absl::Status status = check(o);
+  Orphans orphans;
+  const absl::Status status = verify(o, &orphans);
   if (o.json) {
-    const nlohmann::json out = {{"ok", status.ok()}, {"error", std::string(status.message())}};
-    std::printf("%s\n", out.dump().c_str());
+    print_json({{"ok", status.ok()},
+                {"error", std::string(status.message())},
+                {"orphans", {{"files", orphans.files}, {"bytes", orphans.bytes}}}});
   } else if (status.ok()) {
-    std::printf("%s: whole%s\n", o.loom.c_str(), o.scene.empty() ? "" : ", and baked from this level");
+    std::printf("%s: whole%s\n", escape_controls(o.loom).c_str(), o.scene.empty() ? "" : ", and baked from this level");
+    if (orphans.files > 0) {
+      std::printf("  %llu files (%s) in its chunks folder are of other bakes: the manifest does not name them\n",
+                  static_cast<unsigned long long>(orphans.files),
+                  human_bytes(static_cast<double>(orphans.bytes)).c_str());
+    }
   }
   return status;
 }
@@ -55,6 +97,7 @@ Command verify_command() {
           {{"OUT", ".loom folder", &o->loom, true},
            {"--scene", "level to check against; stale is an error", &o->scene},
            {"--json", "print the result as JSON", &o->json}},
+          [] { return absl::OkStatus(); },
           [o] { return run(*o); }};
 }
 

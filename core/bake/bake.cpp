@@ -23,19 +23,30 @@ class ChunkWriter {
     seconds_ += seconds_since(start);
     if (!ref.ok()) {
       if (status_.ok()) status_ = ref.status();
+      failed_ = true;
       return {};
     }
     return *ref;
   }
+  /// Of a put: further ones are not worth the work.
+  bool failed() const { return failed_.load(std::memory_order_relaxed); }
   const absl::Status& status() const { return status_; }
   double seconds() const { return seconds_; }
 
  private:
   ChunkStore store_;
   std::mutex mutex_;
+  std::atomic<bool> failed_{false};
   absl::Status status_;  // guarded by mutex_, like the next
   double seconds_ = 0;
 };
+
+absl::Status cancelled(const std::filesystem::path& loom) {
+  std::error_code error;
+  const bool old = std::filesystem::exists(loom / "manifest", error);
+  return absl::CancelledError("bake cancelled; " + loom.string() +
+                              (old ? " still holds the earlier bake, whole" : " holds no asset yet: bake again"));
+}
 
 void add_cell(const CellResult& c, BakeReport* report) {
   report->rays_gather += c.stats.gather_rays;
@@ -75,12 +86,13 @@ absl::StatusOr<BakeReport> bake(const RayTracer& tracer, const BakeParams& param
     };
   }
   bool done = parallel_for(cells.size(), cell_stage, [&](uint64_t i) {
+    if (writer.failed()) return;
     cells[i] = bake_cell(tracer, make_cell_task(plan, scene, plan.cells[i]));
     rays += cells[i].stats.gather_rays + cells[i].stats.visibility_rays;
     cell_refs[i] = writer.put(encode_cell(cells[i].chunk));
   });
-  if (!done) return absl::CancelledError("bake cancelled; finished chunks are kept, the old manifest stays in force");
   LL_RETURN_IF_ERROR(writer.status());
+  if (!done) return cancelled(loom);
   double transport = 0, compress = 0;
   for (const CellResult& c : cells) {
     add_cell(c, &report);
@@ -99,12 +111,15 @@ absl::StatusOr<BakeReport> bake(const RayTracer& tracer, const BakeParams& param
   std::vector<ChunkRef> relight(used.size());
   const ReceiverSearch search(scene, plan.layout, plan.receivers);
   done = parallel_for(used.size(), control.stage("relight rays"), [&](uint64_t i) {
+    if (writer.failed()) return;
     relight[i] =
         writer.put(encode_relight(bake_relight(tracer, plan, search, plan.placement.probes[used[i]].position)));
   });
-  if (!done) return absl::CancelledError("bake cancelled; finished chunks are kept, the old manifest stays in force");
+  LL_RETURN_IF_ERROR(writer.status());
+  if (!done) return cancelled(loom);
   std::vector<ChunkRef> surfaces(scene.objects.size());
   for (uint32_t o = 0; o < surfaces.size(); ++o) {
+    if (writer.failed()) break;
     if (plan.layout.uv[o].corners.empty()) continue;
     const SurfaceChunk surface = make_surface(plan, scene, o);
     if (!surface.keys.empty()) surfaces[o] = writer.put(encode_surface(surface));

@@ -9,21 +9,6 @@
 namespace lightloom {
 namespace {
 
-absl::Status check(const BakeParams& p) {
-  const auto bad = [](const std::string& what) { return absl::InvalidArgumentError(what); };
-  if (p.order < 0 || p.order > kMaxShOrder) return bad("--order must be 0 to " + std::to_string(kMaxShOrder));
-  if (!(p.spacing >= 0) || !std::isfinite(p.spacing)) return bad("--spacing must be a positive number of metres");
-  if (p.links < 1 || p.links > 32) return bad("--links must be 1 to 32");
-  if (p.rays < 1 || p.rays > 65536) return bad("--rays must be 1 to 65536");
-  if (p.relight_rays < 1 || p.relight_rays > 1 << 20) return bad("--relight-rays must be 1 to 1048576");
-  if (p.max_rank < 0 || p.max_rank > 256) return bad("--max-rank must be 0 to 256");
-  if (!(p.threshold >= 0) || !std::isfinite(p.threshold)) return bad("--threshold must be ≥ 0");
-  if (p.cell_receivers < 16 || p.cell_receivers > 1 << 16) return bad("--cell-receivers must be 16 to 65536");
-  if (!(p.texels_per_metre >= 0) || !std::isfinite(p.texels_per_metre)) return bad("--texels-per-metre must be ≥ 0");
-  if (p.lightmap_size < 0 || p.lightmap_size > 16384) return bad("--lightmap-size must be 0 to 16384");
-  return absl::OkStatus();
-}
-
 /// Probe cells are counted in int32, and a level has as many as fit its bounds.
 absl::Status check_spacing(float spacing, const Aabb& bounds) {
   constexpr double kMostCells = 4096;    // along a side of the level
@@ -100,8 +85,25 @@ Parallel BakeControl::stage(const std::string& name) const {
   return how;
 }
 
+absl::Status check_params(const BakeParams& p) {
+  const auto bad = [](const std::string& what) { return absl::InvalidArgumentError(what); };
+  if (p.order < 0 || p.order > kMaxShOrder) return bad("--order must be 0 to " + std::to_string(kMaxShOrder));
+  if (!(p.spacing >= 0) || !std::isfinite(p.spacing)) return bad("--spacing must be a positive number of metres");
+  if (p.links < 1 || p.links > 32) return bad("--links must be 1 to 32");
+  if (p.rays < 1 || p.rays > 65536) return bad("--rays must be 1 to 65536");
+  if (p.relight_rays < 1 || p.relight_rays > 1 << 20) return bad("--relight-rays must be 1 to 1048576");
+  if (p.max_rank < 0 || p.max_rank > 256) return bad("--max-rank must be 0 to 256");
+  if (!(p.threshold >= 0) || !std::isfinite(p.threshold)) return bad("--threshold must be ≥ 0");
+  if (p.cell_receivers < 16 || p.cell_receivers > 1 << 16) return bad("--cell-receivers must be 16 to 65536");
+  if (!(p.texels_per_metre >= 0) || !std::isfinite(p.texels_per_metre)) return bad("--texels-per-metre must be ≥ 0");
+  if (p.lightmap_size < 0 || p.lightmap_size > kMaxLightmapSide) {
+    return bad("--lightmap-size must be 0 to " + std::to_string(kMaxLightmapSide));
+  }
+  return absl::OkStatus();
+}
+
 absl::StatusOr<Plan> make_plan(const RayTracer& tracer, const BakeParams& request, const BakeControl& control) {
-  LL_RETURN_IF_ERROR(check(request));
+  LL_RETURN_IF_ERROR(check_params(request));
   const Scene& scene = tracer.scene();
   Plan plan;
   plan.params = request;

@@ -46,6 +46,9 @@ struct Plan {
 /// Probes that a receiver may read besides its k links: the one that sets the support radius, and fallbacks.
 inline constexpr int kFallbacks = 16;
 
+/// Whether the numbers are in range; make_plan checks them too.
+absl::Status check_params(const BakeParams& request);
+
 /// Errors: parameters out of range, a scene without receivers, cancellation.
 absl::StatusOr<Plan> make_plan(const RayTracer& tracer, const BakeParams& request, const BakeControl& control);
 

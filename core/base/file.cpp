@@ -15,9 +15,30 @@ namespace {
 
 namespace fs = std::filesystem;
 
-absl::Status system_error(std::string_view what, const fs::path& path) {
-  const int error = errno;
-  const std::string message = std::string(what) + " " + path.string() + ": " + std::strerror(error);
+/// How to mend a system error; empty if nobody knows.
+std::string_view mend(int error) {
+  switch (error) {
+    case ENOENT:
+    case ENOTDIR:
+    case ENAMETOOLONG:
+    case ELOOP:
+      return "; check the path";
+    case EACCES:
+    case EPERM:
+      return "; change its permissions, or choose another place";
+    case EROFS:
+      return "; choose another place";
+    case ENOSPC:
+    case EDQUOT:
+      return "; free space there, or choose another place";
+    default:
+      return "";
+  }
+}
+
+absl::Status system_error(std::string_view what, const fs::path& path, int error = errno) {
+  const std::string message =
+      std::string(what) + " " + path.string() + ": " + std::strerror(error) + std::string(mend(error));
   if (error == ENOENT) return absl::NotFoundError(message);
   if (error == EACCES || error == EROFS) return absl::PermissionDeniedError(message);
   if (error == ENOSPC || error == EDQUOT) return absl::ResourceExhaustedError(message);
@@ -61,11 +82,12 @@ absl::Status write_all(const fs::path& path, std::span<const uint8_t> data) {
 }  // namespace
 
 absl::StatusOr<std::vector<uint8_t>> read_file(const fs::path& path) {
-  const Fd fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  // O_NONBLOCK: opening a pipe would wait for its other end.
+  const Fd fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   if (fd.get() < 0) return system_error("cannot open", path);
   struct stat info {};
   if (::fstat(fd.get(), &info) != 0) return system_error("cannot stat", path);
-  if (!S_ISREG(info.st_mode)) return absl::InvalidArgumentError(path.string() + " is not a regular file");
+  if (!S_ISREG(info.st_mode)) return absl::InvalidArgumentError(path.string() + " is not a regular file; give one");
   std::vector<uint8_t> data(static_cast<size_t>(info.st_size));
   size_t done = 0;
   while (done < data.size()) {
@@ -78,6 +100,38 @@ absl::StatusOr<std::vector<uint8_t>> read_file(const fs::path& path) {
   return data;
 }
 
+absl::Status check_replaceable(const fs::path& path) {
+  struct stat info {};
+  if (::lstat(path.c_str(), &info) != 0) {
+    return errno == ENOENT ? absl::OkStatus() : system_error("cannot write", path);
+  }
+  if (S_ISREG(info.st_mode)) return absl::OkStatus();
+  const char* what = S_ISDIR(info.st_mode)   ? "a folder"
+                     : S_ISLNK(info.st_mode) ? "a symbolic link"
+                                             : "a device, pipe or socket";
+  return absl::FailedPreconditionError("cannot write " + path.string() + ": it is " + what +
+                                       "; choose another name, or remove it first");
+}
+
+absl::Status check_writable(const fs::path& path) {
+  LL_RETURN_IF_ERROR(check_replaceable(path));
+  std::error_code error;
+  fs::path folder = fs::absolute(path, error).parent_path();
+  if (error) return system_error("cannot write", path, error.value());
+  // Missing folders are made when something is written: what counts is the one that they will be made in.
+  while (!fs::exists(folder, error) && !error && folder.has_relative_path()) folder = folder.parent_path();
+  if (error) return system_error("cannot write", path, error.value());
+  if (!fs::is_directory(folder, error)) {
+    return absl::FailedPreconditionError("cannot write " + path.string() + ": " + folder.string() +
+                                         " is not a folder; choose another place");
+  }
+  const fs::path probe = temporary_beside(folder / "probe");
+  const Fd fd(::open(probe.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644));
+  if (fd.get() < 0) return system_error("cannot write in", folder);
+  ::unlink(probe.c_str());
+  return absl::OkStatus();
+}
+
 fs::path temporary_beside(const fs::path& path) {
   static std::atomic<uint64_t> counter{0};
   fs::path temporary = path;
@@ -86,7 +140,8 @@ fs::path temporary_beside(const fs::path& path) {
 }
 
 absl::Status commit_file(const fs::path& temporary, const fs::path& path) {
-  absl::Status status = sync_path(temporary, O_RDONLY);
+  absl::Status status = check_replaceable(path);
+  if (status.ok()) status = sync_path(temporary, O_RDONLY);
   if (status.ok() && ::rename(temporary.c_str(), path.c_str()) != 0) status = system_error("cannot write", path);
   if (!status.ok()) {
     ::unlink(temporary.c_str());
@@ -101,9 +156,10 @@ absl::Status write_file_atomic(const fs::path& path, std::span<const uint8_t> da
     std::error_code error;
     fs::create_directories(path.parent_path(), error);
     if (error) {
-      return absl::UnavailableError("cannot create folder " + path.parent_path().string() + ": " + error.message());
+      return system_error("cannot create folder", path.parent_path(), error.value());
     }
   }
+  LL_RETURN_IF_ERROR(check_replaceable(path));
   const fs::path temporary = temporary_beside(path);
   if (absl::Status status = write_all(temporary, data); !status.ok()) {
     ::unlink(temporary.c_str());

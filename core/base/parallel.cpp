@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <exception>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -39,7 +40,10 @@ bool parallel_for(uint64_t n, const Parallel& how, const std::function<void(uint
 
   std::vector<std::jthread> threads;
   threads.reserve(count - 1);
-  for (uint64_t t = 1; t < count; ++t) threads.emplace_back(work);
+  try {
+    for (uint64_t t = 1; t < count; ++t) threads.emplace_back(work);
+  } catch (const std::system_error&) {  // the system has no more: those that there are do the work
+  }
   work();
   threads.clear();  // joins
 

@@ -17,7 +17,7 @@ class CancelFlag {
   std::atomic<bool> cancelled_{false};
 };
 
-/// How a loop runs. threads = 0 means one per hardware thread.
+/// How a loop runs. threads = 0 means one per hardware thread; fewer run if the system has no more.
 struct Parallel {
   int threads = 0;
   const CancelFlag* cancel = nullptr;

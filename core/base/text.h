@@ -11,4 +11,7 @@ namespace lightloom {
 /// "..." at the cut.
 std::string printable(std::string_view text, size_t max = 120);
 
+/// `text` whole, on one line: control characters escaped (C style), all else kept.
+std::string escape_controls(std::string_view text);
+
 }  // namespace lightloom

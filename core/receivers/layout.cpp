@@ -13,7 +13,6 @@
 namespace lightloom {
 namespace {
 
-constexpr int kMaxSide = 8192;        // of one object's lightmap or a scene atlas
 constexpr int kMaxImageSide = 16384;  // of all objects' lightmaps together
 constexpr double kDefaultTexels = 65536;
 
@@ -42,9 +41,9 @@ double round_coarsely(double value) {
 }
 
 absl::Status check_arguments(const Scene& scene, const LayoutOptions& options) {
-  if (options.lightmap_size < 0 || options.lightmap_size > kMaxSide) {
+  if (options.lightmap_size < 0 || options.lightmap_size > kMaxLightmapSide) {
     return absl::InvalidArgumentError(absl::StrCat("lightmap size ", options.lightmap_size,
-                                                   " is out of range; it must be 1 to ", kMaxSide, " texels"));
+                                                   " is out of range; it must be 1 to ", kMaxLightmapSide, " texels"));
   }
   if (!(options.texels_per_metre >= 0) || !std::isfinite(options.texels_per_metre)) {
     return absl::InvalidArgumentError(
@@ -97,9 +96,9 @@ absl::StatusOr<std::optional<AtlasLayout>> scene_layout(const Scene& scene, cons
     if (receives_lightmap(object) && !(has_unit_uv1(object) && uv1_area(object) > 0)) return std::nullopt;
   }
   const double wanted = options.lightmap_size > 0 ? options.lightmap_size : scene_atlas_side(scene, texels_per_metre);
-  if (!(wanted <= kMaxSide)) {
+  if (!(wanted <= kMaxLightmapSide)) {
     return absl::InvalidArgumentError(absl::StrCat("the scene's atlas would be ", wanted, " texels wide, over ",
-                                                   kMaxSide, "; lower the texels per metre"));
+                                                   kMaxLightmapSide, "; lower the texels per metre"));
   }
   const int side = static_cast<int>(wanted);
   AtlasLayout layout;
@@ -148,7 +147,7 @@ std::optional<LightmapUv> own_uv1(const Object& object, double texels_per_metre)
   const double wanted = scaled_area(object) * texels_per_metre * texels_per_metre / uv_area;
   const double aspect = double{metres.x} / metres.y;
   const double width = std::ceil(std::sqrt(wanted * aspect)), height = std::ceil(std::sqrt(wanted / aspect));
-  if (!(width <= kMaxSide && height <= kMaxSide)) return std::nullopt;
+  if (!(width <= kMaxLightmapSide && height <= kMaxLightmapSide)) return std::nullopt;
   LightmapUv uv = scaled_uv1(object, std::max(1, static_cast<int>(width)), std::max(1, static_cast<int>(height)));
 
   Vec2 lo = uv.corners[0][0], hi = lo;
@@ -187,7 +186,7 @@ absl::StatusOr<AtlasLayout> per_object_layout(const Scene& scene, const LayoutOp
     } else {
       AtlasOptions atlas;
       atlas.texels_per_metre = static_cast<float>(texels_per_metre);
-      atlas.max_size = kMaxSide;
+      atlas.max_size = kMaxLightmapSide;
       LL_ASSIGN_OR_RETURN(layout.uv[i], generate_atlas(object, atlas));
     }
     sizes[i] = {layout.uv[i].width, layout.uv[i].height};

@@ -18,6 +18,8 @@ enum class LayoutMode : uint8_t {
   kPerObject,  ///< a lightmap per object, packed
 };
 
+inline constexpr int kMaxLightmapSide = 8192;  ///< of a scene atlas, or of one object's lightmap; texels
+
 struct Placement {
   int x = 0, y = 0;  ///< of local texel (0,0), texels of the image
   bool operator==(const Placement&) const = default;

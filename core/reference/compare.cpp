@@ -146,11 +146,25 @@ Image difference_image(const Image& a, const Image& b, const CompareOptions& opt
   }
   // Twice the mean is white in the pictures beside it, so it is here.
   const float exposure = sum > 0 ? static_cast<float>(count / sum) / 2 : 1;
-  for (int y = 0; y < a.height; ++y) {
-    for (int x = 0; x < a.width; ++x) {
-      if (!valid(a, a.index(x, y)) || !valid(b, a.index(x, y))) continue;
-      const Vec3 d = a.rgb(x, y) - b.rgb(x, y) * options.scale_b;
-      out.set_rgb(x, y, Vec3{std::abs(d.x), std::abs(d.y), std::abs(d.z)} * (gain * exposure));
+  const auto in_block = [&](int x0, int y0, const auto& visit) {
+    for (int y = y0; y < std::min(y0 + options.block, a.height); ++y) {
+      for (int x = x0; x < std::min(x0 + options.block, a.width); ++x) {
+        if (valid(a, a.index(x, y)) && valid(b, a.index(x, y))) visit(x, y);
+      }
+    }
+  };
+  for (int y0 = 0; y0 < a.height; y0 += options.block) {
+    for (int x0 = 0; x0 < a.width; x0 += options.block) {
+      Vec3 d;
+      float weight = 0;
+      in_block(x0, y0, [&](int x, int y) {
+        const float w = area(a, b, a.index(x, y));
+        d += (a.rgb(x, y) - b.rgb(x, y) * options.scale_b) * w;
+        weight += w;
+      });
+      if (!(weight > 0)) continue;
+      d *= gain * exposure / weight;
+      in_block(x0, y0, [&](int x, int y) { out.set_rgb(x, y, {std::abs(d.x), std::abs(d.y), std::abs(d.z)}); });
     }
   }
   return out;

@@ -25,7 +25,7 @@ struct Comparison {
 /// Fails if sizes differ, nothing is valid in both, or a valid value is not finite.
 absl::StatusOr<Comparison> compare(const Image& a, const Image& b, const CompareOptions& options);
 
-/// |a − scale·b| times `gain`, per pixel, 0 where not valid in both; exposed by the truth's mean so that 1 is white.
+/// |a − scale·b| times `gain`, per block, 0 where not valid in both; exposed by the truth's mean so that 1 is white.
 Image difference_image(const Image& a, const Image& b, const CompareOptions& options, float gain);
 
 }  // namespace lightloom

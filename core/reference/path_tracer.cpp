@@ -6,8 +6,10 @@
 #include <cmath>
 #include <functional>
 #include <optional>
+#include <string>
 #include <vector>
 
+#include "core/base/text.h"
 #include "core/receivers/texel_opening.h"
 
 namespace lightloom {
@@ -146,7 +148,7 @@ absl::StatusOr<ReferenceResult> reference_lightmap(const RayTracer& tracer, cons
 absl::StatusOr<ReferenceResult> reference_camera(const RayTracer& tracer, const Camera& camera, int width,
                                                  const ReferenceOptions& options) {
   const Scene& scene = tracer.scene();
-  const int height = std::max(1, static_cast<int>(std::lround(static_cast<float>(width) / camera.aspect)));
+  LL_ASSIGN_OR_RETURN(const int height, image_height(camera, width));
   const size_t pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
   Halves halves(pixels);
   std::vector<float> valid(pixels, 0);
@@ -176,6 +178,15 @@ absl::StatusOr<ReferenceResult> reference_camera(const RayTracer& tracer, const 
   }
   result.noise = halves.noise(valid);
   return result;
+}
+
+absl::StatusOr<int> image_height(const Camera& camera, int width) {
+  constexpr double kMaxHeight = 16384;
+  const double height = std::round(static_cast<double>(width) / static_cast<double>(camera.aspect));
+  if (height <= kMaxHeight) return std::max(1, static_cast<int>(height));
+  return absl::InvalidArgumentError("camera '" + printable(camera.name) + "' is so narrow that a picture of width " +
+                                    std::to_string(width) +
+                                    " would have more than 16384 rows; mend its aspectRatio or lower --width");
 }
 
 Vec3 camera_direction(const Camera& camera, float x, float y) {

@@ -31,7 +31,7 @@ Vec3 shade(const RayTracer& tracer, const SurfaceElements& elements, const Recei
 
 absl::StatusOr<Image> render_view(const RayTracer& tracer, const SurfaceElements& elements,
                                   std::span<const Vec3> irradiance, const Camera& camera, const ViewOptions& options) {
-  const int height = std::max(1, static_cast<int>(std::lround(static_cast<float>(options.width) / camera.aspect)));
+  LL_ASSIGN_OR_RETURN(const int height, image_height(camera, options.width));
   Image image(options.width, height, {"R", "G", "B"});
   const ReceiverSearch search(tracer.scene(), elements.layout, elements.receivers);
   const uint32_t side = std::max(1u, static_cast<uint32_t>(std::sqrt(static_cast<float>(options.samples))));

@@ -36,7 +36,9 @@ std::vector<Vec3> light(const BakedLevel& level, int bounces, Device device) {
   const SurfaceInputs inputs = value_or_die(light_surfaces(*level.tracer, level.elements, 16, {}));
   PlayOptions options;
   options.iterations = bounces;
-  options.cpu = device == Device::kCpu;
+  options.player = device == Device::kCpu    ? Player::kDecoder
+                   : device == Device::kSimd ? Player::kSimd
+                                             : Player::kVulkan;
   options.validation = device == Device::kVulkan;
   return value_or_die(play(level.loom(), inputs, level.scene->environment, options));
 }

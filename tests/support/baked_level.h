@@ -38,8 +38,9 @@ struct BakedLevel {
 /// Aborts the program with the error's text on failure: a test level must bake.
 std::unique_ptr<BakedLevel> bake_level(Scene scene, const BakeParams& params, int threads = 0);
 
-/// E per surface element after `bounces` frames, by the CPU decoder or by Vulkan under the validation layers.
-enum class Device { kCpu, kVulkan };
+/// E per surface element after `bounces` frames, by the reference decoder, by the runtime on the processor, or by Vulkan under the
+/// validation layers.
+enum class Device { kCpu, kSimd, kVulkan };
 std::vector<Vec3> light(const BakedLevel& level, int bounces, Device device = Device::kCpu);
 
 /// The value, or the program ends with the error's text.

@@ -84,7 +84,7 @@ TEST(LiveStage, EEqualsThatOfRays) {
   options.direct = DirectSource::kRays;
   Lit rays(options);
   rays.light();
-  options.cpu = true;
+  options.player = Player::kDecoder;
   Lit cpu(options);
   cpu.light();
   EXPECT_LT(rel_rmse(rays.lightmap(), cpu.lightmap()), 1e-3);
@@ -136,7 +136,7 @@ TEST(LiveStage, ANewColourNeedsNoBake) {
   for (const float v : *green.channel("R")) red_after += v;
   EXPECT_LT(red_after, 0.97 * red_before);  // the red that the wall sent is gone
   StageOptions options = live();
-  options.cpu = true;
+  options.player = Player::kDecoder;
   Lit cpu(options, "left:0.02,0.5,0.02");
   cpu.light();
   EXPECT_LT(rel_rmse(green, cpu.lightmap()), 0.02);

@@ -54,7 +54,7 @@ TEST(SceneEdit, ErrorsNameWhatIsWrong) {
   Scene scene = *builtin_scene("cornell");
   EXPECT_EQ(set_albedo("nobody:1,1,1", &scene).code(), absl::StatusCode::kNotFound);
   for (const char* bad : {"floor", "floor:", "floor:1,2", "floor:1,2,3,4", "floor:1;2;3", "floor:-1,0,0",
-                          "floor:nan,0,0", "floor:1,2,x", "floor:1,2,3 4"}) {
+                          "floor:nan,0,0", "floor:1.5,0,0", "floor:1,2,x", "floor:1,2,3 4"}) {
     EXPECT_EQ(set_albedo(bad, &scene).code(), absl::StatusCode::kInvalidArgument) << bad;
   }
   EXPECT_TRUE(set_albedo("", &scene).ok());

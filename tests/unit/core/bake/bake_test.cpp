@@ -159,6 +159,26 @@ TEST(Bake, CancelKeepsTheOldManifest) {
   EXPECT_TRUE(verify_asset(level->loom()).ok());
 }
 
+TEST(Bake, StopsAtTheFirstChunkThatCannotBeWritten) {
+  const Scene scene = test::room_with_crate();
+  const auto tracer = test::value_or_die(RayTracer::create(scene));
+  const test::TemporaryFolder folder;
+  ASSERT_TRUE(write_file_atomic(folder.path() / "x.loom" / "chunks", std::string_view("not a folder")).ok());
+  BakeControl control;
+  control.threads = 1;
+  uint64_t first = 0, last = 0;
+  bool relight = false;
+  control.progress = [&](const std::string& stage, uint64_t, uint64_t, uint64_t rays) {
+    if (stage == "cells") first = first == 0 ? rays : first, last = rays;
+    relight |= stage == "relight rays";
+  };
+  const auto result = bake(*tracer, small(), folder.path() / "x.loom", control);
+  EXPECT_THAT(std::string(result.status().message()), HasSubstr("chunks"));
+  EXPECT_GT(first, 0u);
+  EXPECT_EQ(last, first) << "rays were shot after the first cell";
+  EXPECT_FALSE(relight);
+}
+
 TEST(Bake, RefusesWhatItCannotBake) {
   const auto error = [](Scene scene, BakeParams params) {
     const test::TemporaryFolder folder;

@@ -104,6 +104,42 @@ TEST_F(FileTest, AFailedRenameLeavesNothingBehind) {
   EXPECT_EQ(files(), 1u);
 }
 
+TEST_F(FileTest, OnlyRegularFilesAreReplaced) {
+  ASSERT_TRUE(write_file_atomic(folder_ / "file", std::string_view("old")).ok());
+  fs::create_symlink("file", folder_ / "link");
+  fs::create_symlink("nothing", folder_ / "dangling");
+  fs::create_directory(folder_ / "folder");
+  ASSERT_EQ(::mkfifo((folder_ / "pipe").c_str(), 0644), 0);
+  for (const char* name : {"link", "dangling", "folder", "pipe"}) {
+    const fs::path path = folder_ / name;
+    EXPECT_EQ(write_file_atomic(path, std::string_view("new")).code(), absl::StatusCode::kFailedPrecondition) << name;
+    ASSERT_TRUE(write_file_atomic(folder_ / "temporary", std::string_view("new")).ok());
+    EXPECT_EQ(commit_file(folder_ / "temporary", path).code(), absl::StatusCode::kFailedPrecondition) << name;
+    EXPECT_EQ(check_writable(path).code(), absl::StatusCode::kFailedPrecondition) << name;
+  }
+  EXPECT_EQ(check_replaceable("/dev/null").code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_EQ(text_of(folder_ / "file"), "old");
+  EXPECT_TRUE(fs::is_symlink(folder_ / "link"));
+  EXPECT_TRUE(fs::is_fifo(folder_ / "pipe"));
+  EXPECT_EQ(files(), 5u) << "no temporary is left";
+}
+
+TEST_F(FileTest, APipeIsNotWaitedFor) {
+  ASSERT_EQ(::mkfifo((folder_ / "pipe").c_str(), 0644), 0);
+  EXPECT_EQ(read_file(folder_ / "pipe").status().code(), absl::StatusCode::kInvalidArgument);
+}
+
+TEST_F(FileTest, CheckWritableLooksAtTheNearestFolderAndLeavesNothing) {
+  EXPECT_TRUE(check_writable(folder_ / "a" / "b" / "c").ok());
+  EXPECT_EQ(files(), 0u);
+  ASSERT_TRUE(write_file_atomic(folder_ / "a", std::string_view("one")).ok());
+  EXPECT_TRUE(check_writable(folder_ / "a").ok());
+  EXPECT_FALSE(check_writable(folder_ / "a" / "b" / "c").ok());
+  EXPECT_FALSE(check_writable(folder_ / std::string(300, 'x')).ok());
+  EXPECT_FALSE(check_writable("/proc/nothing/here").ok());
+  EXPECT_EQ(files(), 1u);
+}
+
 TEST_F(FileTest, ReadErrorsNameThePath) {
   const auto missing = read_file(folder_ / "nothing");
   EXPECT_EQ(missing.status().code(), absl::StatusCode::kNotFound);

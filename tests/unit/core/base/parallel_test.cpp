@@ -1,6 +1,9 @@
 #include "core/base/parallel.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <stdexcept>
@@ -84,6 +87,25 @@ TEST_P(ParallelFor, ProgressCountsUpToTheTotal) {
   ASSERT_EQ(seen.size(), 50u);
   for (size_t i = 0; i < seen.size(); ++i) EXPECT_EQ(seen[i], i + 1);
 }
+
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && !defined(__clang__)  // they map terabytes
+TEST(ParallelForLimits, GoesOnWithTheThreadsThatTheSystemGives) {
+  const pid_t child = ::fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    struct rlimit limit {};
+    limit.rlim_cur = limit.rlim_max = rlim_t{256} << 20;  // room for a few stacks of 8 MiB
+    if (::setrlimit(RLIMIT_AS, &limit) != 0) ::_exit(2);
+    std::atomic<uint64_t> runs{0};
+    const bool done = parallel_for(4000, {1000, nullptr, {}}, [&](uint64_t) { ++runs; });
+    ::_exit(done && runs == 4000 ? 0 : 1);
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFEXITED(status)) << "signal " << WTERMSIG(status);
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+}
+#endif
 
 INSTANTIATE_TEST_SUITE_P(Threads, ParallelFor, ::testing::Values(0, 1, 2, 3, 8));
 

@@ -18,5 +18,9 @@ TEST(Printable, NeverCutsACharacterInHalf) {
   EXPECT_EQ(printable("\x80\x80\x80", 1), "...");
 }
 
+TEST(EscapeControls, LeavesQuotesAndUtf8) {
+  EXPECT_EQ(escape_controls("a\n\"b\" 'c' \x1b[1m \x7f …"), "a\\n\"b\" 'c' \\033[1m \\177 …");
+}
+
 }  // namespace
 }  // namespace lightloom

@@ -156,5 +156,14 @@ TEST(DifferenceImage, ShowsErrorsAgainstTwiceTheMean) {
   EXPECT_EQ(d.rgb(2, 0), Vec3{});
 }
 
+TEST(DifferenceImage, BlocksAreAveragedBeforeTheyAreCompared) {
+  // Errors +1, −1 cancel in the first block; +2, 0 are 1 in the second.
+  const Image d = difference_image(row({2, 0, 3, 1}), row({1, 1, 1, 1}), {.block = 2}, 8);
+  EXPECT_NEAR(d.rgb(0, 0).x, 0, 1e-6f);
+  EXPECT_NEAR(d.rgb(1, 0).x, 0, 1e-6f);
+  EXPECT_NEAR(d.rgb(2, 0).x, 8.0f / 2, 1e-6f);  // mean 1
+  EXPECT_NEAR(d.rgb(3, 0).x, 8.0f / 2, 1e-6f);
+}
+
 }  // namespace
 }  // namespace lightloom

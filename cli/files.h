@@ -1,0 +1,35 @@
+// What can be said about a command's files before any work: that inputs are there, and that outputs can be written and
+// replace nothing else.
+#pragma once
+
+#include <initializer_list>
+#include <string>
+#include <vector>
+
+#include "core/base/status.h"
+
+namespace lightloom {
+
+/// `path` is a regular file.
+absl::Status check_input(const std::string& path);
+/// `path` is a folder with a manifest.
+absl::Status check_loom(const std::string& path);
+
+class OutputCheck {
+ public:
+  /// `inputs`: files and .loom folders that the command reads; empty names are skipped. What a .gltf links to counts too.
+  explicit OutputCheck(std::vector<std::string> inputs);
+
+  /// `option` is what the user calls it. The name must end in one of `suffixes`, and the file be none of the inputs and
+  /// earlier outputs; what it replaces, if anything, is a regular file; its folder takes new files.
+  absl::Status file(const std::string& option, const std::string& path, std::initializer_list<const char*> suffixes);
+  /// A .loom folder: new, empty, or one that was baked before.
+  absl::Status loom(const std::string& option, const std::string& path);
+
+ private:
+  absl::Status unused(const std::string& option, const std::string& path);
+
+  std::vector<std::string> used_;
+};
+
+}  // namespace lightloom
