@@ -1,10 +1,14 @@
 #include "cli/files.h"
 
+#include <absl/strings/str_cat.h>
+#include <sys/stat.h>
+
 #include <algorithm>
 #include <charconv>
 #include <cstdint>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <system_error>
 
 #include "core/base/file.h"
@@ -14,11 +18,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool same_file(const fs::path& a, const fs::path& b) {
+std::string canonical(const std::string& path) {
   std::error_code error;
-  if (fs::equivalent(a, b, error)) return true;
-  const fs::path canonical_a = fs::weakly_canonical(a, error), canonical_b = fs::weakly_canonical(b, error);
-  return !error && canonical_a == canonical_b;
+  return fs::weakly_canonical(path, error).string();
+}
+
+/// Of the file that is there now.
+std::optional<std::pair<uint64_t, uint64_t>> inode(const std::string& path) {
+  struct stat info {};
+  if (::stat(path.c_str(), &info) != 0) return std::nullopt;
+  return std::pair<uint64_t, uint64_t>(info.st_dev, info.st_ino);
 }
 
 std::string percent_decoded(const std::string& uri) {
@@ -91,32 +100,43 @@ absl::Status check_loom(const std::string& path) {
   return absl::OkStatus();
 }
 
-OutputCheck::OutputCheck(std::vector<std::string> inputs) : used_(std::move(inputs)) {
-  for (size_t i = 0, n = used_.size(); i < n; ++i) {
-    for (std::string& linked : linked_files(used_[i])) used_.push_back(std::move(linked));
+OutputCheck::OutputCheck(const std::vector<std::string>& inputs) {
+  for (const std::string& input : inputs) {
+    if (input.empty()) continue;
+    use(input);
+    for (const std::string& linked : linked_files(input)) use(linked);
   }
 }
 
+void OutputCheck::use(const std::string& path) {
+  by_name_.emplace(canonical(path), path);
+  if (const auto file = inode(path)) by_inode_.emplace(*file, path);
+}
+
 absl::Status OutputCheck::unused(const std::string& option, const std::string& path) {
-  for (const std::string& other : used_) {
-    if (!other.empty() && same_file(path, other)) {
-      return absl::InvalidArgumentError(option + " " + path + " would replace " + other +
-                                        ", which this command reads or writes itself; choose another name");
-    }
+  const auto file = inode(path);
+  const auto same_file = file ? by_inode_.find(*file) : by_inode_.end();
+  const auto same_name = by_name_.find(canonical(path));
+  if (same_file == by_inode_.end() && same_name == by_name_.end()) {
+    use(path);
+    return absl::OkStatus();
   }
-  used_.push_back(path);
-  return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat(option, " ", path, " would replace ",
+                                                 same_file != by_inode_.end() ? same_file->second : same_name->second,
+                                                 ", which this command reads or writes itself; choose another name"));
 }
 
 absl::Status OutputCheck::file(const std::string& option, const std::string& path,
                                std::initializer_list<const char*> suffixes) {
   if (std::none_of(suffixes.begin(), suffixes.end(), [&](const char* s) { return path.ends_with(s); })) {
     std::string list;
-    for (const char* s : suffixes) list += (list.empty() ? "" : " or ") + std::string(s);
+    for (const char* s : suffixes) list.append(list.empty() ? "" : " or ").append(s);
     return absl::InvalidArgumentError(option + " '" + path + "' must end in " + list);
   }
   LL_RETURN_IF_ERROR(unused(option, path));
-  return check_writable(path);
+  // One file shows that the folder takes new ones: a sequence has thousands.
+  const bool first = folders_.insert(fs::path(path).parent_path().string()).second;
+  return first ? check_writable(path) : check_replaceable(path);
 }
 
 absl::Status OutputCheck::loom(const std::string& option, const std::string& path) {

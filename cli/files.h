@@ -2,8 +2,12 @@
 // replace nothing else.
 #pragma once
 
+#include <cstdint>
 #include <initializer_list>
+#include <map>
+#include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/base/status.h"
@@ -18,7 +22,7 @@ absl::Status check_loom(const std::string& path);
 class OutputCheck {
  public:
   /// `inputs`: files and .loom folders that the command reads; empty names are skipped. What a .gltf links to counts too.
-  explicit OutputCheck(std::vector<std::string> inputs);
+  explicit OutputCheck(const std::vector<std::string>& inputs);
 
   /// `option` is what the user calls it. The name must end in one of `suffixes`, and the file be none of the inputs and
   /// earlier outputs; what it replaces, if anything, is a regular file; its folder takes new files.
@@ -27,9 +31,13 @@ class OutputCheck {
   absl::Status loom(const std::string& option, const std::string& path);
 
  private:
+  void use(const std::string& path);
   absl::Status unused(const std::string& option, const std::string& path);
 
-  std::vector<std::string> used_;
+  // What is read and written, by name and, where it exists, by device and inode.
+  std::map<std::string, std::string> by_name_;
+  std::map<std::pair<uint64_t, uint64_t>, std::string> by_inode_;
+  std::set<std::string> folders_;  ///< that were found to take new files
 };
 
 }  // namespace lightloom

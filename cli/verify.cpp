@@ -72,7 +72,7 @@ absl::Status verify(const Options& o, Orphans* orphans) {
 
 absl::Status run(const Options& o) {
   Orphans orphans;
-  const absl::Status status = verify(o, &orphans);
+  absl::Status status = verify(o, &orphans);
   if (o.json) {
     print_json({{"ok", status.ok()},
                 {"error", std::string(status.message())},

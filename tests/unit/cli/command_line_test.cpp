@@ -155,6 +155,12 @@ TEST_F(CommandLine, OutputsNeverReplaceInputs) {
   EXPECT_EQ(text_of(scene_), before);
 }
 
+TEST_F(CommandLine, EveryNumberedPictureIsChecked) {
+  const std::string loom = baked();
+  fs::create_directory(path("F_9998.png"));
+  fails(1, {"render", loom, scene_, "-o", path("F.png"), "--frames", "9999", "--light-path", "0,0,0;1,1,1"}, "F_9998");
+}
+
 TEST_F(CommandLine, OutputsNeverReplaceWhatALevelLinksTo) {
   write(path("my wall.png"), "pixels");
   write(path("level.gltf"), R"({"asset": {"version": "2.0"}, "images": [{"uri": "my%20wall.png"}]})");
