@@ -1,7 +1,7 @@
 // The fastest known way to read and use an fp16 matrix with what the passes may use (uvec4 loads, unpackHalf2x16):
 // Y = M·X and nothing else. M has `rows` rows of uvec4, each eight halfs; LL_COLUMNS = 1 or 3 right-hand sides.
 //   LL_ALONG  the eight halfs are neighbours along the sum, as in the project pass; an invocation owns LL_ROWS rows of M
-//   else      they are eight results, as in the receive pass
+//   else      they are eight results, as in the receive pass; an invocation owns LL_ROWS quads
 #version 450
 #extension GL_EXT_control_flow_attributes : require
 #include "runtime/shaders/layout.h"
@@ -36,22 +36,25 @@ void main() {
 
 #else
 
-// x: rows. One invocation has eight results, those of quad `o` of each row.
+// x: rows. One invocation has 8·LL_ROWS results, those of LL_ROWS quads of each row.
 void main() {
   const uint o = invocation_index();
-  if (o >= push.quads) return;
-  vec4 sum[2 * LL_COLUMNS];
-  [[unroll]] for (uint n = 0; n < 2 * LL_COLUMNS; ++n) sum[n] = vec4(0.0);
+  const uint step = push.quads / LL_ROWS;
+  if (o >= step) return;
+  vec4 sum[2 * LL_COLUMNS * LL_ROWS];
+  [[unroll]] for (uint n = 0; n < 2 * LL_COLUMNS * LL_ROWS; ++n) sum[n] = vec4(0.0);
   for (uint k = 0; k < push.rows; ++k) {
-    const uvec4 w = matrix[k * push.quads + o];
-    const vec4 w0 = low(w), w1 = high(w);
     const vec4 v = x[k];
-    [[unroll]] for (uint c = 0; c < LL_COLUMNS; ++c) {
-      sum[2 * c] += v[c] * w0;
-      sum[2 * c + 1] += v[c] * w1;
+    [[unroll]] for (uint q = 0; q < LL_ROWS; ++q) {
+      const uvec4 w = matrix[k * push.quads + q * step + o];
+      const vec4 w0 = low(w), w1 = high(w);
+      [[unroll]] for (uint c = 0; c < LL_COLUMNS; ++c) {
+        sum[2 * (LL_COLUMNS * q + c)] += v[c] * w0;
+        sum[2 * (LL_COLUMNS * q + c) + 1] += v[c] * w1;
+      }
     }
   }
-  [[unroll]] for (uint n = 0; n < 2 * LL_COLUMNS; ++n) y[2 * LL_COLUMNS * o + n] = sum[n];
+  [[unroll]] for (uint n = 0; n < 2 * LL_COLUMNS * LL_ROWS; ++n) y[2 * LL_COLUMNS * LL_ROWS * o + n] = sum[n];
 }
 
 #endif

@@ -14,34 +14,46 @@ namespace lightloom::bench {
 namespace {
 
 // Initialiser lists that glslc wrote from bare_matrix.comp.
-constexpr uint32_t kAcross1[] =
-#include "bare_across_1.inc"
+constexpr uint32_t kAcross1By1[] =
+#include "bare_across_1_1.inc"
     ;
-constexpr uint32_t kAcross3[] =
-#include "bare_across_3.inc"
-    ;
-constexpr uint32_t kAlong1By4[] =
-#include "bare_along_1_4.inc"
+constexpr uint32_t kAcross1By2[] =
+#include "bare_across_1_2.inc"
     ;
 constexpr uint32_t kAlong1By8[] =
 #include "bare_along_1_8.inc"
     ;
-constexpr uint32_t kAlong3By4[] =
-#include "bare_along_3_4.inc"
+constexpr uint32_t kAlong1By16[] =
+#include "bare_along_1_16.inc"
+    ;
+constexpr uint32_t kAcross3By1[] =
+#include "bare_across_3_1.inc"
+    ;
+constexpr uint32_t kAcross3By2[] =
+#include "bare_across_3_2.inc"
     ;
 constexpr uint32_t kAlong3By8[] =
 #include "bare_along_3_8.inc"
+    ;
+constexpr uint32_t kAlong3By16[] =
+#include "bare_along_3_16.inc"
     ;
 
 struct Form {
   const char* name;
   std::span<const uint32_t> spirv;
-  uint32_t columns;
-  uint32_t rows;  ///< of an invocation; 0: it has eight results
+  uint32_t columns, rows;  ///< LL_COLUMNS, LL_ROWS
+  bool along;
 };
 constexpr Form kForms[] = {
-    {"across", kAcross1, 1, 0},         {"across", kAcross3, 3, 0},         {"along, 4 rows", kAlong1By4, 1, 4},
-    {"along, 8 rows", kAlong1By8, 1, 8}, {"along, 4 rows", kAlong3By4, 3, 4}, {"along, 8 rows", kAlong3By8, 3, 8},
+    {"across, 1", kAcross1By1, 1, 1, false},
+    {"across, 2", kAcross1By2, 1, 2, false},
+    {"along, 8", kAlong1By8, 1, 8, true},
+    {"along, 16", kAlong1By16, 1, 16, true},
+    {"across, 1", kAcross3By1, 3, 1, false},
+    {"across, 2", kAcross3By2, 3, 2, false},
+    {"along, 8", kAlong3By8, 3, 8, true},
+    {"along, 16", kAlong3By16, 3, 16, true},
 };
 
 /// The length of a sum: 16 probes of order 7; a cluster's rank.
@@ -58,17 +70,16 @@ double process_cpu_seconds() {
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
-BareShader::BareShader(Context* context, OwnQueue* queue, size_t form, uint64_t bytes)
-    : context_(context), queue_(queue), form_(form) {
-  const uint32_t rows = kForms[form].rows;
-  const uint64_t quads = bytes / sizeof(uint32_t[4]);
-  const uint64_t of_group = gpu::kDefaultGroup * (rows > 0 ? uint64_t{rows} * kAlongQuads : uint64_t{kAcrossRows});
-  groups_ = static_cast<uint32_t>(std::max<uint64_t>(1, quads / of_group));
-  push_ = rows > 0 ? Push{groups_ * gpu::kDefaultGroup * rows, kAlongQuads}
-                   : Push{kAcrossRows, groups_ * gpu::kDefaultGroup};
+BareShader::BareShader(Context* context, OwnQueue* queue, size_t form, uint32_t group, uint64_t bytes)
+    : context_(context), queue_(queue), form_(form), group_(group) {
+  const Form& f = kForms[form];
+  const uint64_t of_group = uint64_t{group} * f.rows * (f.along ? kAlongQuads : kAcrossRows);
+  groups_ = static_cast<uint32_t>(std::max<uint64_t>(1, bytes / 16 / of_group));
+  const uint32_t owned = groups_ * group * f.rows;
+  push_ = f.along ? Push{owned, kAlongQuads} : Push{kAcrossRows, owned};
   bytes_ = 16ull * push_.rows * push_.quads;
   const uint64_t x_bytes = 96ull * std::max(kAlongQuads, kAcrossRows);
-  const uint64_t y_bytes = 96ull * (rows > 0 ? push_.rows : push_.quads);
+  const uint64_t y_bytes = 96ull * owned;
   // Lavapipe's memory is the host's; a copy would measure the same.
   for (size_t b = 0; const uint64_t size : {bytes_, x_bytes, y_bytes}) {
     buffers_[b++] = *Buffer::create(context_, size, BufferUse::kHost);
@@ -105,9 +116,8 @@ void BareShader::create_pipeline() {
   pipeline.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
   must(vk.CreateShaderModule(context_->device, &module, nullptr, &pipeline.stage.module));
   pipeline.stage.pName = "main";
-  const uint32_t group = gpu::kDefaultGroup;
-  const VkSpecializationMapEntry entry{0, 0, sizeof group};
-  const VkSpecializationInfo specialization{1, &entry, sizeof group, &group};
+  const VkSpecializationMapEntry entry{0, 0, sizeof group_};
+  const VkSpecializationInfo specialization{1, &entry, sizeof group_, &group_};
   pipeline.stage.pSpecializationInfo = &specialization;
   pipeline.layout = layout_;
   must(vk.CreateComputePipelines(context_->device, VK_NULL_HANDLE, 1, &pipeline, nullptr, &pipeline_));
@@ -145,7 +155,7 @@ BareShader::~BareShader() {
   vk.DestroyDescriptorSetLayout(context_->device, set_layout_, nullptr);
 }
 
-const char* BareShader::name() const { return kForms[form_].name; }
+std::string BareShader::name() const { return kForms[form_].name + std::string(", workgroups of ") + std::to_string(group_); }
 
 double BareShader::seconds(uint32_t dispatches) const {
   const VulkanTable& vk = context_->vk;
@@ -173,7 +183,8 @@ std::vector<std::unique_ptr<BareShader>> bare_shaders(Context* context, OwnQueue
                                                       uint64_t bytes) {
   std::vector<std::unique_ptr<BareShader>> shaders;
   for (size_t f = 0; f < std::size(kForms); ++f) {
-    if (kForms[f].columns == columns) shaders.emplace_back(new BareShader(context, queue, f, bytes));
+    if (kForms[f].columns != columns) continue;
+    for (const uint32_t group : {8u, 64u}) shaders.emplace_back(new BareShader(context, queue, f, group, bytes));
   }
   return shaders;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "runtime/vulkan/buffer.h"
@@ -19,13 +20,13 @@ class BareShader {
   BareShader(const BareShader&) = delete;
   BareShader& operator=(const BareShader&) = delete;
 
-  const char* name() const;
+  std::string name() const;
   /// Of one dispatch; another and another of them are the difference between two submissions.
   double gb_per_cpu_second() const;
 
  private:
   friend std::vector<std::unique_ptr<BareShader>> bare_shaders(Context*, OwnQueue*, uint32_t, uint64_t);
-  BareShader(Context* context, OwnQueue* queue, size_t form, uint64_t bytes);
+  BareShader(Context* context, OwnQueue* queue, size_t form, uint32_t group, uint64_t bytes);
   void create_pipeline();
   void create_set();
   double seconds(uint32_t dispatches) const;
@@ -36,6 +37,7 @@ class BareShader {
   Context* context_;
   OwnQueue* queue_;
   size_t form_;
+  uint32_t group_;
   uint64_t bytes_;
   Push push_;
   uint32_t groups_;
@@ -47,7 +49,7 @@ class BareShader {
   VkDescriptorSet set_ = VK_NULL_HANDLE;
 };
 
-/// All forms for so many right-hand sides (1, 3), each with a matrix of about `bytes`.
+/// All forms, in workgroups of 8 and 64, for so many right-hand sides (1, 3), each with a matrix of about `bytes`.
 std::vector<std::unique_ptr<BareShader>> bare_shaders(Context* context, OwnQueue* queue, uint32_t columns,
                                                       uint64_t bytes);
 
