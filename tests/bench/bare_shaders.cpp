@@ -46,14 +46,10 @@ struct Form {
   bool along;
 };
 constexpr Form kForms[] = {
-    {"across, 1", kAcross1By1, 1, 1, false},
-    {"across, 2", kAcross1By2, 1, 2, false},
-    {"along, 8", kAlong1By8, 1, 8, true},
-    {"along, 16", kAlong1By16, 1, 16, true},
-    {"across, 1", kAcross3By1, 3, 1, false},
-    {"across, 2", kAcross3By2, 3, 2, false},
-    {"along, 8", kAlong3By8, 3, 8, true},
-    {"along, 16", kAlong3By16, 3, 16, true},
+    {"across, 1", kAcross1By1, 1, 1, false}, {"across, 2", kAcross1By2, 1, 2, false},
+    {"along, 8", kAlong1By8, 1, 8, true},    {"along, 16", kAlong1By16, 1, 16, true},
+    {"across, 1", kAcross3By1, 3, 1, false}, {"across, 2", kAcross3By2, 3, 2, false},
+    {"along, 8", kAlong3By8, 3, 8, true},    {"along, 16", kAlong3By16, 3, 16, true},
 };
 
 /// The length of a sum: 16 probes of order 7; a cluster's rank.
@@ -155,7 +151,9 @@ BareShader::~BareShader() {
   vk.DestroyDescriptorSetLayout(context_->device, set_layout_, nullptr);
 }
 
-std::string BareShader::name() const { return kForms[form_].name + std::string(", workgroups of ") + std::to_string(group_); }
+std::string BareShader::name() const {
+  return kForms[form_].name + std::string(", workgroups of ") + std::to_string(group_);
+}
 
 double BareShader::seconds(uint32_t dispatches) const {
   const VulkanTable& vk = context_->vk;

@@ -70,8 +70,9 @@ Spread spread(std::vector<double> values) {
 }
 
 void print_pass_header() {
-  std::printf("| path | pass | MB | CPU ms (least … most) | GB per CPU-s | bare | ratio | bare, 3 columns | ratio |\n"
-              "|---|---|---|---|---|---|---|---|---|\n");
+  std::printf(
+      "| path | pass | MB | CPU ms (least … most) | GB per CPU-s | bare | ratio | bare, 3 columns | ratio |\n"
+      "|---|---|---|---|---|---|---|---|---|\n");
 }
 
 void print_pass(const PassSamples& samples) {
@@ -92,8 +93,9 @@ void print_pass(const PassSamples& samples) {
 }
 
 void print_frame_header() {
-  std::printf("| path | surface elements that changed | set ms | frame ms | tiles | probes | cells |\n"
-              "|---|---|---|---|---|---|---|\n");
+  std::printf(
+      "| path | surface elements that changed | set ms | frame ms | tiles | probes | cells |\n"
+      "|---|---|---|---|---|---|---|\n");
 }
 
 void print_frame(const FrameRow& row) {
