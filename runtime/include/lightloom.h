@@ -99,7 +99,7 @@ typedef struct lightloom_create_info {
   uint64_t byte_budget;    /* of the asset, device memory or host memory with CPU; 0: no limit */
   uint64_t page_bytes;     /* largest asset buffer; 0: 64 MiB. Small values are for tests. */
   uint64_t staging_bytes;  /* of the upload buffer of one frame; 0: 8 MiB */
-  uint32_t workgroup_size; /* 8, 16, 32 or 64 invocations; 0: 64 */
+  uint32_t workgroup_size; /* 8, 16, 32 or 64 invocations; 0: what suits the device */
   uint32_t max_workgroups; /* per dispatch dimension; 0: what the device allows. For tests. */
   uint32_t threads;        /* with CPU; 0: one per hardware thread */
   uint32_t reserved;       /* 0 */

@@ -17,7 +17,7 @@ LL_CONSTANT uint kDefaultGroup = 64u;
 LL_CONSTANT uint kRelightProbes = 4u;
 LL_CONSTANT uint kRayTile = 64u;
 /// Columns of a cluster that one workgroup of the project pass computes.
-LL_CONSTANT uint kJobColumns = 8u;
+LL_CONSTANT uint kJobColumns = 16u;
 /// Receivers of one octet, the halfs of a uvec4.
 LL_CONSTANT uint kOctet = 8u;
 /// Octets of one workgroup of the receive pass.

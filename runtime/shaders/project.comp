@@ -3,6 +3,7 @@
 //   c_k = Σ_ij projection[k][i][j]·λ_ij − correction[k]·c_0
 // One workgroup per job. An invocation loads eight λ of each colour once and uses them for all columns of the job.
 #version 450
+#extension GL_EXT_control_flow_attributes : require
 #include "layout.h"
 
 layout(push_constant) uniform Push { ProjectPush push; };
@@ -53,17 +54,18 @@ void main() {
   const uint row = cluster.probes * push.stride8;
   const uint stride4 = 2 * push.stride8;
 
+  // Without a branch in the middle: where the job has fewer columns the last one is read again.
   vec3 column[kJobColumns];
-  for (uint k = 0; k < kJobColumns; ++k) column[k] = vec3(0.0);
-  for (uint e = local; e < row; e += kGroup) {
+  [[unroll]] for (uint k = 0; k < kJobColumns; ++k) column[k] = vec3(0.0);
+  const uint matrix_at = quad + cluster.projection + first * row;
+  for (uint e = local; columns > 0 && e < row; e += kGroup) {
     const uint i = e / push.stride8;
     const uint at = words[probes + i] * 3 * stride4 + 2 * (e - i * push.stride8);
     const vec4 r0 = lambda[at], r1 = lambda[at + 1];
     const vec4 g0 = lambda[at + stride4], g1 = lambda[at + stride4 + 1];
     const vec4 b0 = lambda[at + 2 * stride4], b1 = lambda[at + 2 * stride4 + 1];
-    for (uint k = 0; k < kJobColumns; ++k) {
-      if (k >= columns) break;
-      const uvec4 w = matrix[quad + cluster.projection + (first + k) * row + e];
+    [[unroll]] for (uint k = 0; k < kJobColumns; ++k) {
+      const uvec4 w = matrix[matrix_at + min(k, columns - 1) * row + e];
       const vec4 w0 = vec4(unpackHalf2x16(w.x), unpackHalf2x16(w.y));
       const vec4 w1 = vec4(unpackHalf2x16(w.z), unpackHalf2x16(w.w));
       column[k] += vec3(dot8(r0, r1, w0, w1), dot8(g0, g1, w0, w1), dot8(b0, b1, w0, w1));
@@ -76,10 +78,10 @@ void main() {
   }
 
   // Sum over the invocations, in a fixed order whatever the subgroups are.
-  for (uint k = 0; k < kJobColumns; ++k) {
-    for (uint c = 0; c < 3; ++c) partial[(3 * k + c) * kRow + local] = column[k][c];
+  [[unroll]] for (uint k = 0; k < kJobColumns; ++k) {
+    [[unroll]] for (uint c = 0; c < 3; ++c) partial[(3 * k + c) * kRow + local] = column[k][c];
   }
-  for (uint c = 0; c < 3; ++c) partial[(3 * kJobColumns + c) * kRow + local] = mean[c];
+  [[unroll]] for (uint c = 0; c < 3; ++c) partial[(3 * kJobColumns + c) * kRow + local] = mean[c];
   barrier();
   for (uint m = local; m < kSums; m += kGroup) {
     float sum = 0.0;

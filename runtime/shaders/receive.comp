@@ -3,6 +3,7 @@
 // No |E| above π times the greatest radiance there is, so that feedback stays bounded whatever the asset says
 // (docs/runtime.md). One invocation per octet of receivers, the halfs of one uvec4 of a column.
 #version 450
+#extension GL_EXT_control_flow_attributes : require
 #include "layout.h"
 
 layout(push_constant) uniform Push { ReceivePush push; };
@@ -36,40 +37,38 @@ void main() {
   const uint quad = active_cells[cell].base * (kCellUnit / 16);
   const vec3 limit = kPi * vec3(uintBitsToFloat(control.limit[0]), uintBitsToFloat(control.limit[1]),
                                 uintBitsToFloat(control.limit[2]));
+  const uint cluster_at = active_cells[cell].base + words[word];
+  const uint octet_at = word + words[word + 4], element_at = word + words[word + 5];
+  const uint uniform_at = quad + words[word + 6], coefficient_at = quad + words[word + 7];
   const uint begin = kReceiveOctets * (group - active_cells[cell].first_group);
   const uint end = min(begin + kReceiveOctets, active_cells[cell].octets);
   for (uint o = begin + gl_LocalInvocationIndex; o < end; o += kGroup) {
-    const Cluster cluster = clusters[active_cells[cell].base + words[word] + words[word + words[word + 4] + 2 * o]];
-    const uint index = words[word + words[word + 4] + 2 * o + 1];
-    const uint coefficient = quad + words[word + 7] + cluster.first_coefficient;
-
+    const Cluster cluster = clusters[cluster_at + words[octet_at + 2 * o]];
+    const uint coefficient = coefficient_at + cluster.first_coefficient;
     const vec3 c0 = coefficients[coefficient].rgb;
-    const uvec4 u = quads[quad + words[word + 6] + o];
+    const uvec4 u = quads[uniform_at + o];
     const vec4 u0 = kPi * vec4(unpackUnorm2x16(u.x), unpackUnorm2x16(u.y));
     const vec4 u1 = kPi * vec4(unpackUnorm2x16(u.z), unpackUnorm2x16(u.w));
-    vec4 r0 = u0 * c0.r, r1 = u1 * c0.r;
-    vec4 g0 = u0 * c0.g, g1 = u1 * c0.g;
-    vec4 b0 = u0 * c0.b, b1 = u1 * c0.b;
-    for (uint k = 0; k < cluster.rank; ++k) {
-      const uvec4 w = quads[quad + cluster.reconstruction + k * cluster.octets + index];
+    vec4 r[2] = {u0 * c0.r, u1 * c0.r}, g[2] = {u0 * c0.g, u1 * c0.g}, b[2] = {u0 * c0.b, u1 * c0.b};
+    uint at = quad + cluster.reconstruction + words[octet_at + 2 * o + 1];
+    for (uint k = 0; k < cluster.rank; ++k, at += cluster.octets) {
+      const uvec4 w = quads[at];
       const vec4 w0 = vec4(unpackHalf2x16(w.x), unpackHalf2x16(w.y));
       const vec4 w1 = vec4(unpackHalf2x16(w.z), unpackHalf2x16(w.w));
       const vec3 c = coefficients[coefficient + 1 + k].rgb;
-      r0 += w0 * c.r, r1 += w1 * c.r;
-      g0 += w0 * c.g, g1 += w1 * c.g;
-      b0 += w0 * c.b, b1 += w1 * c.b;
+      r[0] += w0 * c.r, r[1] += w1 * c.r;
+      g[0] += w0 * c.g, g[1] += w1 * c.g;
+      b[0] += w0 * c.b, b[1] += w1 * c.b;
     }
 
-    for (uint n = 0; n < kOctet; ++n) {
-      const uint element = words[word + words[word + 5] + kOctet * o + n];
-      if (element == kNoElement) continue;
-      const bool low = n < 4;
-      const uint m = n & 3u;
-      const vec3 e = low ? vec3(r0[m], g0[m], b0[m]) : vec3(r1[m], g1[m], b1[m]);
-      const vec3 bounded = clamp(e, -limit, limit);
-      irradiance[3 * element] = bounded.r;
-      irradiance[3 * element + 1] = bounded.g;
-      irradiance[3 * element + 2] = bounded.b;
+    [[unroll]] for (uint n = 0; n < kOctet; ++n) {
+      const uint element = words[element_at + kOctet * o + n];
+      if (element != kNoElement) {
+        const vec3 bounded = clamp(vec3(r[n / 4][n % 4], g[n / 4][n % 4], b[n / 4][n % 4]), -limit, limit);
+        irradiance[3 * element] = bounded.r;
+        irradiance[3 * element + 1] = bounded.g;
+        irradiance[3 * element + 2] = bounded.b;
+      }
     }
   }
 }

@@ -11,6 +11,8 @@ namespace {
 constexpr uint64_t kDefaultPageBytes = 64ull << 20;
 constexpr uint64_t kDefaultStagingBytes = 8ull << 20;
 constexpr uint64_t kLeastStagingBytes = 4096;
+/// Invocations of a workgroup on a processor: its vector's.
+constexpr uint32_t kCpuGroup = 8;
 
 }  // namespace
 
@@ -31,7 +33,9 @@ absl::StatusOr<std::unique_ptr<VulkanBackend>> VulkanBackend::create(const light
   VkFormatProperties depth;
   c.vk.GetPhysicalDeviceFormatProperties(c.physical, VK_FORMAT_D32_SFLOAT, &depth);
   c.linear_depth = (depth.optimalTilingFeatures & VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT) != 0;
-  c.group = info.workgroup_size == 0 ? gpu::kDefaultGroup : info.workgroup_size;
+  // What a workgroup shares is little beside what each invocation repeats where one core runs all of them.
+  const uint32_t group = properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU ? kCpuGroup : gpu::kDefaultGroup;
+  c.group = info.workgroup_size == 0 ? group : info.workgroup_size;
   c.max_groups = std::min(c.limits.maxComputeWorkGroupCount[0], c.limits.maxComputeWorkGroupCount[1]);
   if (info.max_workgroups != 0) c.max_groups = std::min(c.max_groups, info.max_workgroups);
   c.frames = info.frames_in_flight;

@@ -1,135 +1,18 @@
-// The library on an engine's own device and command buffers: E as image, the direct light pass, and a memory layout as of
-// a discrete GPU, under the validation layers.
+// The library on an engine's own device and command buffers: E as image and the direct light pass, under the validation
+// layers.
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <cstring>
 
-#include "runtime/include/lightloom_vulkan.h"
-#include "runtime/vulkan/barriers.h"
-#include "runtime/vulkan/buffer.h"
-#include "runtime/vulkan/own_queue.h"
-#include "tests/unit/runtime/test_runtime.h"
+#include "tests/unit/runtime/test_engine.h"
 
 namespace lightloom {
 namespace {
 
-using testing::joined;
+using testing::Engine;
 using testing::p999_error;
-using testing::Received;
 using testing::SyntheticAsset;
-
-/// A device with a queue, and a runtime on it.
-class Engine {
- public:
-  explicit Engine(VkFormat format = VK_FORMAT_UNDEFINED, uint32_t device_flags = LIGHTLOOM_CREATE_VALIDATION) {
-    lightloom_vulkan_device_info info{};
-    info.struct_size = sizeof info;
-    info.flags = device_flags;
-    info.message = Received::add;
-    info.message_user = &received_;
-    EXPECT_EQ(lightloom_vulkan_make_device(&info, &device_), LIGHTLOOM_OK) << joined(received_.errors);
-    EXPECT_TRUE(context_.vk.load_instance(device_.instance, device_.get_instance_proc_addr).ok());
-    EXPECT_TRUE(context_.vk.load_device(device_.device, nullptr).ok());
-    context_.device = device_.device;
-    VkPhysicalDeviceProperties properties;
-    context_.vk.GetPhysicalDeviceProperties(device_.physical_device, &properties);
-    context_.limits = properties.limits;
-    context_.vk.GetPhysicalDeviceMemoryProperties(device_.physical_device, &context_.memory);
-    queue_ = *OwnQueue::create(&context_, device_.queue, device_.queue_family);
-
-    lightloom_vulkan_create_info create{};
-    create.struct_size = sizeof create;
-    create.message = Received::add;
-    create.message_user = &received_;
-    create.instance = device_.instance;
-    create.physical_device = device_.physical_device;
-    create.device = device_.device;
-    create.get_instance_proc_addr = device_.get_instance_proc_addr;
-    create.queue_family = device_.queue_family;
-    create.frames_in_flight = 2;
-    create.image_format = format;
-    EXPECT_EQ(lightloom_vulkan_create(&create, &runtime_), LIGHTLOOM_OK) << joined(received_.errors);
-  }
-  ~Engine() {
-    lightloom_destroy(runtime_);
-    queue_ = nullptr;
-    lightloom_vulkan_destroy_device(&device_);
-    EXPECT_TRUE(received_.validation.empty()) << joined(received_.validation);
-  }
-  lightloom_runtime* runtime() const { return runtime_; }
-  Context& context() { return context_; }
-  OwnQueue& queue() { return *queue_; }
-
-  void load(SyntheticAsset& asset) {
-    const auto manifest = encode_manifest(asset.manifest);
-    lightloom_asset_info info{};
-    info.struct_size = sizeof info;
-    info.manifest = manifest.data();
-    info.manifest_bytes = manifest.size();
-    info.read_chunk = SyntheticAsset::read_chunk;
-    info.read_user = &asset;
-    ASSERT_EQ(lightloom_load(runtime_, &info), LIGHTLOOM_OK) << joined(received_.errors);
-  }
-  void frame(const lightloom_frame_info* info = nullptr) {
-    ASSERT_TRUE(queue_
-                    ->run([&](VkCommandBuffer commands) -> absl::Status {
-                      EXPECT_EQ(lightloom_vulkan_record(runtime_, commands, info), LIGHTLOOM_OK)
-                          << joined(received_.errors);
-                      return absl::OkStatus();
-                    })
-                    .ok());
-  }
-  lightloom_vulkan_outputs outputs() const {
-    lightloom_vulkan_outputs out{};
-    out.struct_size = sizeof out;
-    EXPECT_EQ(lightloom_vulkan_get_outputs(runtime_, &out), LIGHTLOOM_OK);
-    return out;
-  }
-  /// The floats that `copy` records into a host buffer of `count`. No barrier: what we recorded is visible already.
-  template <class Copy>
-  std::vector<float> read(size_t count, Copy copy) {
-    const Buffer host = *Buffer::create(&context_, count * sizeof(float), BufferUse::kHost);
-    EXPECT_TRUE(queue_
-                    ->run([&](VkCommandBuffer commands) -> absl::Status {
-                      copy(commands, host.handle());
-                      barrier_after(context_, commands);
-                      return absl::OkStatus();
-                    })
-                    .ok());
-    std::vector<float> out(count);
-    std::memcpy(out.data(), host.mapped(), count * sizeof(float));
-    return out;
-  }
-  std::vector<Vec3> read_vec3(VkBuffer buffer) {
-    const uint32_t S = outputs().surface_elements;
-    const std::vector<float> values = read(3 * S, [&](VkCommandBuffer commands, VkBuffer to) {
-      const VkBufferCopy copy{0, 0, 12ull * S};
-      context_.vk.CmdCopyBuffer(commands, buffer, to, 1, &copy);
-    });
-    std::vector<Vec3> out(S);
-    for (uint32_t s = 0; s < S; ++s) out[s] = {values[3 * s], values[3 * s + 1], values[3 * s + 2]};
-    return out;
-  }
-  template <class F>
-  F function(const char* name) const {
-    return reinterpret_cast<F>(device_.get_instance_proc_addr(device_.instance, name));
-  }
-
- private:
-  Received received_;
-  lightloom_vulkan_device device_{};
-  Context context_;
-  std::unique_ptr<OwnQueue> queue_;
-  lightloom_runtime* runtime_ = nullptr;
-};
-
-void set(lightloom_runtime* r, const SurfaceLight& l) {
-  ASSERT_EQ(lightloom_set_direct(r, &l.direct[0].x, 0, l.direct.size()), LIGHTLOOM_OK);
-  ASSERT_EQ(lightloom_set_albedo(r, &l.albedo[0].x, 0, l.albedo.size()), LIGHTLOOM_OK);
-  ASSERT_EQ(lightloom_set_emission(r, &l.emission[0].x, 0, l.emission.size()), LIGHTLOOM_OK);
-  ASSERT_EQ(lightloom_set_environment(r, &l.environment.x), LIGHTLOOM_OK);
-}
 
 void expect_frames_agree(uint32_t device_flags, const testing::RandomAssetOptions& options, int frames) {
   SyntheticAsset asset = testing::random_asset(options);
@@ -137,7 +20,7 @@ void expect_frames_agree(uint32_t device_flags, const testing::RandomAssetOption
   const SurfaceLight light = testing::random_light(decoder->surface_elements, 3);
   Engine engine(VK_FORMAT_UNDEFINED, device_flags);
   engine.load(asset);
-  set(engine.runtime(), light);
+  engine.light(light);
   std::vector<Vec3> expected(decoder->surface_elements);
   for (int frame = 0; frame < frames; ++frame) {
     engine.frame();
@@ -169,7 +52,7 @@ TEST(Engine, ImageShowsEAndFillsGutters) {
   Engine engine(VK_FORMAT_R32G32B32A32_SFLOAT);
   engine.load(asset);
   const SurfaceLight light = testing::random_light(engine.outputs().surface_elements, 3);
-  set(engine.runtime(), light);
+  engine.light(light);
   engine.frame();
   engine.frame();
   const lightloom_vulkan_outputs out = engine.outputs();
