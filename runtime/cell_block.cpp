@@ -129,7 +129,7 @@ std::pmr::vector<uint8_t> sh_table(uint32_t order, uint32_t rays, std::pmr::memo
     for (size_t j = 0; j < stride; ++j) table[(r / 4 * stride + j) * 4 + r % 4] = y[j];
   }
   std::pmr::vector<uint8_t> bytes(table.size() * sizeof(float), memory);
-  std::memcpy(bytes.data(), table.data(), bytes.size());
+  if (!bytes.empty()) std::memcpy(bytes.data(), table.data(), bytes.size());
   return bytes;
 }
 
