@@ -19,7 +19,7 @@ static_assert(static_cast<uint32_t>(LightType::kPoint) == gpu::kPoint &&
 
 template <class T>
 void copy(const std::vector<T>& from, const Buffer& to) {
-  std::memcpy(to.mapped, from.data(), from.size() * sizeof(T));
+  if (!from.empty()) std::memcpy(to.mapped, from.data(), from.size() * sizeof(T));
 }
 
 void append_layer(const Image& image, std::vector<float>* texels) {
