@@ -52,12 +52,12 @@ class LiveStage : public Stage {
 
   absl::Status light() override {
     if (!renderer_) LL_RETURN_IF_ERROR(start());
+    LL_RETURN_IF_ERROR(renderer_->update_lights());
     const auto begin = std::chrono::steady_clock::now();
     // The last frame is recorded together with the next picture.
     waiting_ = options_.bounces > 0;
     for (int i = 1; i < options_.bounces; ++i) {
       LL_RETURN_IF_ERROR(not_interrupted());
-      LL_RETURN_IF_ERROR(renderer_->update_lights());
       LL_RETURN_IF_ERROR(gpu_->run([&](VkCommandBuffer commands) {
         if (i == 1) renderer_->record_shadows(commands);
         return record(commands);
@@ -91,6 +91,7 @@ class LiveStage : public Stage {
       return absl::OkStatus();
     }));
     waiting_ = false;
+    LL_RETURN_IF_ERROR(read_times());
     std::vector<Vec3> e(n);
     std::memcpy(e.data(), host.mapped, std::min<uint64_t>(n * sizeof(Vec3), outputs_.irradiance_bytes));
     return lightmap_image(elements_, e);

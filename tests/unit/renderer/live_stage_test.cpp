@@ -93,6 +93,16 @@ TEST(LiveStage, EEqualsThatOfRays) {
   EXPECT_LT(rel_rmse(shadows.picture(Layer::kIndirect), cpu.picture(Layer::kIndirect)), 0.06);
 }
 
+TEST(LiveStage, OneBounceNeedsNoPictureFirst) {
+  Lit shadows(live(1));
+  shadows.light();
+  StageOptions options = live(1);
+  options.player = Player::kDecoder;
+  Lit cpu(options);
+  cpu.light();
+  EXPECT_LT(rel_rmse(shadows.lightmap(), cpu.lightmap()), 0.02);
+}
+
 TEST(LiveStage, NoBouncesAreDirectLightAlone) {
   Lit lit(live(0));
   lit.light();
