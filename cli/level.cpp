@@ -5,8 +5,8 @@
 #include "cli/files.h"
 #include "cli/interrupt.h"
 #include "core/base/text.h"
-#include "core/reference/path_tracer.h"
 #include "core/scene/gltf.h"
+#include "core/scene/picture.h"
 #include "core/scene/rig.h"
 
 namespace lightloom {

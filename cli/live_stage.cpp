@@ -7,38 +7,12 @@
 #include <cstring>
 
 #include "cli/interrupt.h"
-#include "core/asset/asset.h"
-#include "core/base/file.h"
+#include "cli/loom_runtime.h"
 #include "core/relight/lightmap.h"
 #include "runtime/renderer/renderer.h"
 
 namespace lightloom {
 namespace {
-
-/// The error that lightloom reported last.
-struct Messages {
-  std::string error;
-
-  static void receive(void* user, lightloom_message_kind, const char* text) {
-    static_cast<Messages*>(user)->error = text;
-  }
-  absl::Status status(lightloom_result result) const {
-    if (result == LIGHTLOOM_OK) return absl::OkStatus();
-    return absl::UnavailableError("Vulkan runtime: " + (error.empty() ? lightloom_result_string(result) : error));
-  }
-};
-
-int read_chunk(void* user, const uint8_t digest[32], uint64_t size, void* out) {
-  ChunkRef ref;
-  std::copy(digest, digest + 32, ref.digest.bytes.begin());
-  ref.size = size;
-  const auto bytes = static_cast<const ChunkStore*>(user)->get(ref);
-  if (!bytes.ok()) return 1;
-  std::copy(bytes->begin(), bytes->end(), static_cast<uint8_t*>(out));
-  return 0;
-}
-
-const float* floats(const std::vector<Vec3>& v) { return reinterpret_cast<const float*>(v.data()); }
 
 void store(Vec3 v, float* to) {
   to[0] = v.x;
@@ -72,7 +46,7 @@ class LiveStage : public Stage {
       return waiting_ ? record(commands) : absl::OkStatus();
     });
     waiting_ = false;
-    LL_RETURN_IF_ERROR(read_times());
+    LL_ASSIGN_OR_RETURN(times_, play_times(messages_, runtime_.get()));
     return image;
   }
 
@@ -91,7 +65,7 @@ class LiveStage : public Stage {
       return absl::OkStatus();
     }));
     waiting_ = false;
-    LL_RETURN_IF_ERROR(read_times());
+    LL_ASSIGN_OR_RETURN(times_, play_times(messages_, runtime_.get()));
     std::vector<Vec3> e(n);
     std::memcpy(e.data(), host.mapped, std::min<uint64_t>(n * sizeof(Vec3), outputs_.irradiance_bytes));
     return lightmap_image(elements_, e);
@@ -101,12 +75,11 @@ class LiveStage : public Stage {
   absl::Status start();
   absl::Status upload();
   absl::Status record(VkCommandBuffer commands);
-  absl::Status read_times();
 
   // Destroyed from the last to the first: the runtime before its device.
   std::unique_ptr<renderer::Gpu> gpu_;
   std::unique_ptr<renderer::Renderer> renderer_;
-  Messages messages_;
+  RuntimeMessages messages_;
   std::unique_ptr<lightloom_runtime, decltype(&lightloom_destroy)> runtime_{nullptr, lightloom_destroy};
   lightloom_vulkan_outputs outputs_{};
   bool waiting_ = false;
@@ -119,7 +92,7 @@ absl::Status LiveStage::start() {
                                                             static_cast<uint32_t>(options_.shadow_size)));
   lightloom_vulkan_create_info create{};
   create.struct_size = sizeof create;
-  create.message = Messages::receive;
+  create.message = RuntimeMessages::receive;
   create.message_user = &messages_;
   create.instance = gpu_->instance();
   create.physical_device = gpu_->physical();
@@ -134,24 +107,11 @@ absl::Status LiveStage::start() {
   LL_RETURN_IF_ERROR(messages_.status(lightloom_vulkan_create(&create, &runtime)));
   runtime_.reset(runtime);
 
-  LL_ASSIGN_OR_RETURN(const auto manifest, read_file(std::filesystem::path(options_.loom) / "manifest"));
-  ChunkStore store = chunk_store(options_.loom);
-  lightloom_asset_info asset{};
-  asset.struct_size = sizeof asset;
-  asset.manifest = manifest.data();
-  asset.manifest_bytes = manifest.size();
-  asset.read_chunk = read_chunk;
-  asset.read_user = &store;
-  LL_RETURN_IF_ERROR(messages_.status(lightloom_load(runtime, &asset)));
-
+  LL_RETURN_IF_ERROR(load_loom(options_.loom, messages_, runtime));
   LL_ASSIGN_OR_RETURN(const SurfaceInputs inputs, surface_materials(*level_.tracer, elements_, options_.direct_samples,
                                                                     bar_->parallel("materials", options_.threads)));
   bar_->finish();
-  const uint64_t n = inputs.albedo.size();
-  const float sky[3] = {scene.environment.x, scene.environment.y, scene.environment.z};
-  LL_RETURN_IF_ERROR(messages_.status(lightloom_set_albedo(runtime, floats(inputs.albedo), 0, n)));
-  LL_RETURN_IF_ERROR(messages_.status(lightloom_set_emission(runtime, floats(inputs.emission), 0, n)));
-  LL_RETURN_IF_ERROR(messages_.status(lightloom_set_environment(runtime, sky)));
+  LL_RETURN_IF_ERROR(set_albedo_emission_sky(inputs, scene.environment, messages_, runtime));
   LL_RETURN_IF_ERROR(upload());
   outputs_.struct_size = sizeof outputs_;
   LL_RETURN_IF_ERROR(messages_.status(lightloom_vulkan_get_outputs(runtime, &outputs_)));
@@ -210,14 +170,6 @@ absl::Status LiveStage::record(VkCommandBuffer commands) {
   frame.shadow_layout = renderer::kSampled.layout;
   frame.shadow_map_size = renderer_->shadow_maps().size();
   return messages_.status(lightloom_vulkan_record(runtime_.get(), commands, &frame));
-}
-
-absl::Status LiveStage::read_times() {
-  lightloom_stats stats{};
-  stats.struct_size = sizeof stats;
-  LL_RETURN_IF_ERROR(messages_.status(lightloom_get_stats(runtime_.get(), &stats)));
-  times_ = {stats.radiosity_ms, stats.relight_ms, stats.project_ms, stats.receive_ms};
-  return absl::OkStatus();
 }
 
 }  // namespace

@@ -3,17 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/base/sampling.h"
+#include "core/scene/srgb.h"
+
 namespace lightloom {
 namespace {
 
 constexpr float kGain = 8;
-
-/// IEC 61966-2-1.
-float encode(float c) {
-  c = std::clamp(c, 0.0f, 1.0f);
-  return c <= 0.0031308f ? 12.92f * c : 1.055f * std::pow(c, 1 / 2.4f) - 0.055f;
-}
-float decode(float c) { return c <= 0.04045f ? c / 12.92f : std::pow((c + 0.055f) / 1.055f, 2.4f); }
 
 template <class Value>
 Image per_pixel(int width, int height, const Value& value) {
@@ -30,7 +26,7 @@ absl::StatusOr<Image> make_sheet(Stage* stage, const Level& level, const Camera&
                                  float* exposure) {
   // Path tracer and pictures look through the same points, so that edges do not count as errors: everything is made
   // at one sample per pixel of a larger picture.
-  const int side = std::max(1, static_cast<int>(std::sqrt(static_cast<float>(options.samples))));
+  const int side = static_cast<int>(strata(options.samples));
   const int width = options.width * side;
   LL_ASSIGN_OR_RETURN(const Image direct_points, stage->picture(camera, {Layer::kDirect, width, 1}));
   LL_ASSIGN_OR_RETURN(const Image full_points, stage->picture(camera, {Layer::kFull, width, 1}));
@@ -59,7 +55,8 @@ absl::StatusOr<Image> make_sheet(Stage* stage, const Level& level, const Camera&
   const Image difference = per_pixel(options.width, height, [&](int x, int y) {
     const Vec3 a = full.rgb(x, y), b = traced.rgb(x, y);
     const auto amplify = [](float p, float q) {
-      return decode(std::min(1.0f, kGain * std::abs(encode(p) - encode(q))));
+      const auto shown = [](float c) { return to_srgb(std::clamp(c, 0.0f, 1.0f)); };
+      return static_cast<float>(from_srgb(std::min(1.0f, kGain * std::abs(shown(p) - shown(q)))));
     };
     return Vec3{amplify(a.x, b.x), amplify(a.y, b.y), amplify(a.z, b.z)};
   });

@@ -72,8 +72,21 @@ absl::StatusOr<AssetIndex> AssetIndex::create(const Manifest& m, std::pmr::memor
     index.cells_.push_back({c.chunk, c.receivers, c.clusters, c.first_probe, c.probes});
   }
   index.cell_probes_.assign(m.cell_probes.begin(), m.cell_probes.end());
+  index.list_cells_of_probes();
   LL_RETURN_IF_ERROR(index.sort_digests());
   return index;
+}
+
+/// A counting sort of the pairs of cell and probe.
+void AssetIndex::list_cells_of_probes() {
+  first_cell_.assign(probes_.size() + 1, 0);
+  for (const uint32_t p : cell_probes_) ++first_cell_[p + 1];
+  for (size_t p = 0; p < probes_.size(); ++p) first_cell_[p + 1] += first_cell_[p];
+  probe_cells_.resize(cell_probes_.size());
+  std::pmr::vector<uint32_t> next(first_cell_, first_cell_.get_allocator());
+  for (uint32_t c = 0; c < cells_.size(); ++c) {
+    for (const uint32_t p : probes_of(c)) probe_cells_[next[p]++] = c;
+  }
 }
 
 absl::Status AssetIndex::add_objects(const Manifest& m) {

@@ -57,6 +57,10 @@ class AssetIndex {
   std::span<const uint32_t> probes_of(uint32_t cell) const {
     return cell_probes().subspan(cells_[cell].first_probe, cells_[cell].probes);
   }
+  /// The cells whose probe list has the probe, ascending; one as often as it is in the list.
+  std::span<const uint32_t> cells_of(uint32_t probe) const {
+    return std::span(probe_cells_).subspan(first_cell_[probe], first_cell_[probe + 1] - first_cell_[probe]);
+  }
   std::optional<Target> find(const Digest& digest) const;
 
   /// Decoded and compared with the manifest. DataLoss if anything is wrong; Unimplemented for newer versions.
@@ -76,8 +80,16 @@ class AssetIndex {
 
  private:
   explicit AssetIndex(std::pmr::memory_resource* memory)
-      : objects_(memory), by_id_(memory), probes_(memory), cells_(memory), cell_probes_(memory), by_digest_(memory) {}
+      : objects_(memory),
+        by_id_(memory),
+        probes_(memory),
+        cells_(memory),
+        cell_probes_(memory),
+        first_cell_(memory),
+        probe_cells_(memory),
+        by_digest_(memory) {}
   absl::Status add_objects(const Manifest& manifest);
+  void list_cells_of_probes();
   absl::Status sort_digests();
 
   struct Named {
@@ -90,6 +102,8 @@ class AssetIndex {
   std::pmr::vector<Probe> probes_;
   std::pmr::vector<Cell> cells_;
   std::pmr::vector<uint32_t> cell_probes_;
+  std::pmr::vector<uint32_t> first_cell_;  ///< per probe and one more: range of probe_cells_
+  std::pmr::vector<uint32_t> probe_cells_;
   std::pmr::vector<Named> by_digest_;  ///< sorted
 };
 

@@ -3,6 +3,8 @@
 #include <string>
 #include <utility>
 
+#include "runtime/resident.h"
+
 namespace lightloom {
 namespace {
 
@@ -45,20 +47,12 @@ absl::StatusOr<AssetSource> AssetSource::open(std::span<const uint8_t> bytes, Re
 
 absl::StatusOr<SourceCell> AssetSource::cell(uint32_t index) const {
   LL_ASSIGN_OR_RETURN(const auto bytes, chunk(index_.cells()[index].chunk));
-  SourceCell cell;
-  LL_ASSIGN_OR_RETURN(cell.chunk, index_.cell(index, bytes));
-  LL_ASSIGN_OR_RETURN(const auto objects, index_.objects_of(cell.chunk.objects));
-  LL_ASSIGN_OR_RETURN(cell.elements, index_.elements(cell.chunk, objects, keys_of(objects)));
-  const auto probes = index_.probes_of(index);
-  cell.probes.assign(probes.begin(), probes.end());
-  return cell;
+  return resolve_cell(index_, index, bytes, [this](uint32_t o) { return keys_[o]; });
 }
 
 absl::StatusOr<std::vector<uint32_t>> AssetSource::relight(uint32_t probe) const {
   LL_ASSIGN_OR_RETURN(const auto bytes, chunk(index_.probes()[probe].relight));
-  LL_ASSIGN_OR_RETURN(const RelightChunk decoded, index_.relight(probe, bytes));
-  LL_ASSIGN_OR_RETURN(const auto objects, index_.objects_of(decoded.objects));
-  return index_.elements(decoded, objects, keys_of(objects));
+  return resolve_relight(index_, probe, bytes, [this](uint32_t o) { return keys_[o]; });
 }
 
 absl::StatusOr<std::vector<uint8_t>> AssetSource::chunk(const ChunkRef& ref) const {
@@ -66,12 +60,6 @@ absl::StatusOr<std::vector<uint8_t>> AssetSource::chunk(const ChunkRef& ref) con
   std::vector<uint8_t> bytes(ref.size);
   LL_RETURN_IF_ERROR(read_(ref, bytes));
   return bytes;
-}
-
-std::vector<SurfaceKeys> AssetSource::keys_of(std::span<const uint32_t> objects) const {
-  std::vector<SurfaceKeys> keys;
-  for (const uint32_t o : objects) keys.push_back(keys_[o]);
-  return keys;
 }
 
 }  // namespace lightloom

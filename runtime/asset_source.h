@@ -36,6 +36,7 @@ class AssetSource {
   static absl::StatusOr<AssetSource> open(std::span<const uint8_t> manifest, ReadChunk read);
 
   const Manifest& manifest() const { return manifest_; }
+  const AssetIndex& index() const { return index_; }
   uint32_t surface_elements() const { return index_.surface_elements(); }
 
   /// Each cell and each probe's rays may be read any number of times, in any order.
@@ -47,7 +48,6 @@ class AssetSource {
   AssetSource(Manifest manifest, AssetIndex index, ReadChunk read)
       : manifest_(std::move(manifest)), index_(std::move(index)), read_(std::move(read)) {}
   absl::StatusOr<std::vector<uint8_t>> chunk(const ChunkRef& ref) const;
-  std::vector<SurfaceKeys> keys_of(std::span<const uint32_t> objects) const;
 
   Manifest manifest_;
   AssetIndex index_;

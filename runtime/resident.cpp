@@ -31,4 +31,38 @@ absl::StatusOr<std::vector<SurfaceKeys>> keys_of_objects(const AssetIndex& index
   return keys;
 }
 
+absl::StatusOr<SourceCell> resolve_cell(const AssetIndex& index, uint32_t cell, std::span<const uint8_t> bytes,
+                                        absl::FunctionRef<SurfaceKeys(uint32_t)> resident) {
+  SourceCell out;
+  LL_ASSIGN_OR_RETURN(out.chunk, index.cell(cell, bytes));
+  LL_ASSIGN_OR_RETURN(const std::vector<uint32_t> objects, index.objects_of(out.chunk.objects));
+  LL_ASSIGN_OR_RETURN(const std::vector<SurfaceKeys> keys, keys_of_objects(index, objects, resident));
+  LL_ASSIGN_OR_RETURN(out.elements, index.elements(out.chunk, objects, keys));
+  const auto probes = index.probes_of(cell);
+  out.probes.assign(probes.begin(), probes.end());
+  return out;
+}
+
+absl::StatusOr<std::vector<uint32_t>> resolve_relight(const AssetIndex& index, uint32_t probe,
+                                                      std::span<const uint8_t> bytes,
+                                                      absl::FunctionRef<SurfaceKeys(uint32_t)> resident) {
+  LL_ASSIGN_OR_RETURN(const RelightChunk chunk, index.relight(probe, bytes));
+  LL_ASSIGN_OR_RETURN(const std::vector<uint32_t> objects, index.objects_of(chunk.objects));
+  LL_ASSIGN_OR_RETURN(const std::vector<SurfaceKeys> keys, keys_of_objects(index, objects, resident));
+  return index.elements(chunk, objects, keys);
+}
+
+lightloom_counts counts_of(const AssetIndex& index) {
+  lightloom_counts out{};
+  out.surface_elements = index.surface_elements();
+  for (const AssetIndex::Cell& c : index.cells()) out.receivers += c.receivers;
+  out.probes = static_cast<uint32_t>(index.probes().size());
+  out.cells = static_cast<uint32_t>(index.cells().size());
+  out.clusters = index.clusters();
+  out.sh_order = index.order();
+  out.image_width = index.width();
+  out.image_height = index.height();
+  return out;
+}
+
 }  // namespace lightloom

@@ -12,18 +12,18 @@ namespace lightloom {
 absl::Status SimdBackend::load_manifest(std::span<const uint8_t> bytes) {
   unload();  // the old asset goes first: both may not fit
   LL_ASSIGN_OR_RETURN(const Manifest manifest, decode_manifest(bytes));
-  LL_ASSIGN_OR_RETURN(AssetIndex index, AssetIndex::create(manifest, memory_));
+  LL_ASSIGN_OR_RETURN(AssetIndex made, AssetIndex::create(manifest, memory_));
+  const AssetIndex& index = index_.emplace(std::move(made));
   SimdOptions options;
   options.threads = static_cast<int>(options_.threads);
   options.smoothing = options_.smoothing;
   options.memory = memory_;
-  auto runtime = std::make_unique<SimdRuntime>(manifest, index.surface_elements(), options);
+  auto runtime = std::make_unique<SimdRuntime>(index, options);
   if (options_.byte_budget != 0 && runtime->counts().bytes > options_.byte_budget) {
     return over_budget("the surface arrays alone take " + std::to_string(runtime->counts().bytes) +
                        " bytes, the budget is " + std::to_string(options_.byte_budget));
   }
   keys_.assign(index.objects().size(), nullptr);
-  index_.emplace(std::move(index));
   runtime_ = std::move(runtime);
   return absl::OkStatus();
 }
@@ -73,10 +73,8 @@ absl::Status SimdBackend::load_surface(uint32_t object, std::span<const uint8_t>
 }
 
 absl::Status SimdBackend::load_relight(uint32_t probe, std::span<const uint8_t> bytes) {
-  LL_ASSIGN_OR_RETURN(const RelightChunk chunk, index_->relight(probe, bytes));
-  LL_ASSIGN_OR_RETURN(const std::vector<uint32_t> objects, index_->objects_of(chunk.objects));
-  LL_ASSIGN_OR_RETURN(const std::vector<SurfaceKeys> keys, keys_of(objects));
-  LL_ASSIGN_OR_RETURN(const std::vector<uint32_t> rays, index_->elements(chunk, objects, keys));
+  LL_ASSIGN_OR_RETURN(const auto rays,
+                      resolve_relight(*index_, probe, bytes, [this](uint32_t o) { return keys_of(o); }));
   simd::PackedProbe packed = runtime_->pack_probe(rays);
   const std::lock_guard lock(mutex_);
   LL_RETURN_IF_ERROR(check_budget(packed.bytes()));
@@ -85,22 +83,17 @@ absl::Status SimdBackend::load_relight(uint32_t probe, std::span<const uint8_t> 
 }
 
 absl::Status SimdBackend::load_cell(uint32_t cell, std::span<const uint8_t> bytes) {
-  SourceCell source;
-  LL_ASSIGN_OR_RETURN(source.chunk, index_->cell(cell, bytes));
-  LL_ASSIGN_OR_RETURN(const std::vector<uint32_t> objects, index_->objects_of(source.chunk.objects));
-  LL_ASSIGN_OR_RETURN(const std::vector<SurfaceKeys> keys, keys_of(objects));
-  LL_ASSIGN_OR_RETURN(source.elements, index_->elements(source.chunk, objects, keys));
-  const auto probes = index_->probes_of(cell);
-  source.probes.assign(probes.begin(), probes.end());
+  LL_ASSIGN_OR_RETURN(const SourceCell source,
+                      resolve_cell(*index_, cell, bytes, [this](uint32_t o) { return keys_of(o); }));
   simd::PackedCell packed = runtime_->pack_cell(source);
   const std::lock_guard lock(mutex_);
   LL_RETURN_IF_ERROR(check_budget(packed.bytes()));
   return runtime_->load_cell(cell, std::move(packed));
 }
 
-absl::StatusOr<std::vector<SurfaceKeys>> SimdBackend::keys_of(std::span<const uint32_t> objects) const {
+SurfaceKeys SimdBackend::keys_of(uint32_t object) const {
   const std::lock_guard lock(mutex_);
-  return keys_of_objects(*index_, objects, [&](uint32_t o) { return keys_[o]; });
+  return keys_[object];
 }
 
 absl::Status SimdBackend::check_budget(uint64_t more) const {
@@ -148,16 +141,8 @@ absl::Status SimdBackend::read_irradiance(std::span<float> rgb) {
 }
 
 lightloom_counts SimdBackend::counts() const {
-  lightloom_counts out{};
+  lightloom_counts out = counts_of(*index_);
   const SimdCounts c = runtime_->counts();
-  out.surface_elements = c.surface_elements;
-  for (const AssetIndex::Cell& cell : index_->cells()) out.receivers += cell.receivers;
-  out.probes = static_cast<uint32_t>(index_->probes().size());
-  out.cells = static_cast<uint32_t>(index_->cells().size());
-  out.clusters = index_->clusters();
-  out.sh_order = index_->order();
-  out.image_width = index_->width();
-  out.image_height = index_->height();
   out.resident_probes = c.resident_probes;
   out.resident_cells = c.resident_cells;
   out.active_cells = c.active_cells;

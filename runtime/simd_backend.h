@@ -42,7 +42,7 @@ class SimdBackend final : public Backend {
   absl::Status load_surface(uint32_t object, std::span<const uint8_t> bytes);
   absl::Status load_relight(uint32_t probe, std::span<const uint8_t> bytes);
   absl::Status load_cell(uint32_t cell, std::span<const uint8_t> bytes);
-  absl::StatusOr<std::vector<SurfaceKeys>> keys_of(std::span<const uint32_t> objects) const;
+  SurfaceKeys keys_of(uint32_t object) const;
   absl::Status check_budget(uint64_t more) const;
 
   const Options options_;

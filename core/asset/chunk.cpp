@@ -17,7 +17,6 @@ constexpr uint32_t kCellMagic = 0x43434c4cu;     // "LLCC"
 constexpr uint32_t kRelightMagic = 0x52434c4cu;  // "LLCR"
 constexpr uint32_t kSurfaceMagic = 0x53434c4cu;  // "LLCS"
 /// A lightmap side. 2·w·h then fits 31 bits, so keys and bases fit 32 with room for kDead and kSky.
-constexpr uint32_t kMaxSide = 16384;
 
 absl::Status corrupt(std::string_view what, std::string_view why) {
   return absl::DataLossError(std::string(what) + " chunk is corrupt: " + std::string(why) +
@@ -50,26 +49,11 @@ static_assert(sizeof(CellHeader) == 56 && sizeof(ClusterRecord) == 48 && sizeof(
               sizeof(SurfaceHeader) == 56 && sizeof(ChunkObject) == 40);
 
 bool valid_object(const ChunkObject& o) {
-  return o.width >= 1 && o.height >= 1 && o.width <= kMaxSide && o.height <= kMaxSide;
+  return o.width >= 1 && o.height >= 1 && o.width <= kMaxObjectSide && o.height <= kMaxObjectSide;
 }
 uint64_t texel_keys(const ChunkObject& o) { return 2ull * o.width * o.height; }
 uint64_t rounded_up_to_8(uint64_t n) { return (n + 7) / 8 * 8; }
 bool finite_half(Half h) { return (h & 0x7c00u) != 0x7c00u; }
-
-/// Octahedral unit vector, two snorm16 (Cigolle et al., JCGT 3(2), 2014).
-uint32_t encode_normal(Vec3 n) {
-  const float sum = std::abs(n.x) + std::abs(n.y) + std::abs(n.z);
-  float u = n.x / sum, v = n.y / sum;
-  if (n.z < 0) {
-    const float fu = (1 - std::abs(v)) * std::copysign(1.0f, u);
-    v = (1 - std::abs(u)) * std::copysign(1.0f, v);
-    u = fu;
-  }
-  const auto snorm = [](float c) {
-    return static_cast<uint16_t>(static_cast<int16_t>(std::floor(std::clamp(c, -1.0f, 1.0f) * 32767.0f + 0.5f)));
-  };
-  return static_cast<uint32_t>(snorm(u)) | static_cast<uint32_t>(snorm(v)) << 16;
-}
 
 Vec3 decode_normal(uint32_t bits) {
   const auto snorm = [](uint32_t b) {
@@ -96,6 +80,20 @@ absl::Status check_objects(std::string_view what, const std::vector<ChunkObject>
 }
 
 }  // namespace
+
+uint32_t encode_normal(Vec3 n) {
+  const float sum = std::abs(n.x) + std::abs(n.y) + std::abs(n.z);
+  float u = n.x / sum, v = n.y / sum;
+  if (n.z < 0) {
+    const float fu = (1 - std::abs(v)) * std::copysign(1.0f, u);
+    v = (1 - std::abs(u)) * std::copysign(1.0f, v);
+    u = fu;
+  }
+  const auto snorm = [](float c) {
+    return static_cast<uint16_t>(static_cast<int16_t>(std::floor(std::clamp(c, -1.0f, 1.0f) * 32767.0f + 0.5f)));
+  };
+  return static_cast<uint32_t>(snorm(u)) | static_cast<uint32_t>(snorm(v)) << 16;
+}
 
 std::vector<uint8_t> encode_cell(const CellChunk& c) {
   CellHeader header{};

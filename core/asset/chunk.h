@@ -15,6 +15,9 @@
 
 namespace lightloom {
 
+/// Texels along a side of an object's lightmap, at most.
+inline constexpr uint32_t kMaxObjectSide = 16384;
+
 /// An object as a chunk knows it: by identity and lightmap size.
 struct ChunkObject {
   Digest id;
@@ -69,6 +72,9 @@ struct RelightChunk {
   /// Per ray: base(object) + texel key, where base is the running sum of 2·w·h over `objects`; or kDead, kSky.
   std::vector<uint32_t> rays;
 };
+
+/// Octahedral unit vector, two snorm16 (Cigolle et al., JCGT 3(2), 2014): how surface chunks store normals.
+uint32_t encode_normal(Vec3 n);
 
 /// The valid texels of one object, sorted by key.
 struct SurfaceChunk {

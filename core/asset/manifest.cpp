@@ -5,6 +5,7 @@
 #include <cmath>
 #include <string_view>
 
+#include "core/asset/chunk.h"
 #include "core/base/bytes.h"
 #include "core/base/sh.h"
 #include "core/base/text.h"
@@ -93,7 +94,7 @@ absl::Status validate(const Manifest& m) {
     if (o.width < 0 || o.height < 0 || o.x < 0 || o.y < 0 || o.width > m.width - o.x || o.height > m.height - o.y) {
       return corrupt("object '" + printable(o.name) + "' lies outside the lightmap image");
     }
-    constexpr int32_t kLargest = 1 << 14;
+    constexpr auto kLargest = static_cast<int32_t>(kMaxObjectSide);
     if (o.width > kLargest || o.height > kLargest || (o.surface.size > 0 && (o.width == 0 || o.height == 0))) {
       return corrupt("the lightmap of object '" + printable(o.name) + "' has a size that is out of range");
     }

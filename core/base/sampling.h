@@ -1,6 +1,7 @@
 // Warps of the unit square, each beside its density. No libm: sampled directions end up in stored values.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/base/rng.h"
@@ -45,5 +46,8 @@ inline Sample2 stratified(uint32_t i, uint32_t side, Rng* rng) {
   const float v = (static_cast<float>(i / side) + rng->next_float()) * inverse;
   return {std::min(u, below_one), std::min(v, below_one)};
 }
+
+/// Side of the largest square of strata that n samples fill; the rest is left out.
+inline uint32_t strata(int n) { return std::max(1u, static_cast<uint32_t>(std::sqrt(static_cast<float>(n)))); }
 
 }  // namespace lightloom

@@ -6,19 +6,15 @@
 #include <cmath>
 #include <functional>
 #include <optional>
-#include <string>
 #include <vector>
 
-#include "core/base/text.h"
 #include "core/receivers/texel_opening.h"
+#include "core/scene/picture.h"
 
 namespace lightloom {
 namespace {
 
 constexpr int kFirstRouletteDepth = 4;
-
-/// Square strata for n samples; the last, incomplete rows are left out.
-uint32_t strata(int n) { return std::max(1u, static_cast<uint32_t>(std::sqrt(static_cast<float>(n)))); }
 
 /// π times the mean radiance over the cosine-weighted hemisphere of points that `point(jitter)` yields.
 Vec3 irradiance(const RayTracer& tracer, const std::function<ShadingPoint(Sample2)>& point, int bounces, int samples,
@@ -178,15 +174,6 @@ absl::StatusOr<ReferenceResult> reference_camera(const RayTracer& tracer, const 
   }
   result.noise = halves.noise(valid);
   return result;
-}
-
-absl::StatusOr<int> image_height(const Camera& camera, int width) {
-  constexpr double kMaxHeight = 16384;
-  const double height = std::round(static_cast<double>(width) / static_cast<double>(camera.aspect));
-  if (height <= kMaxHeight) return std::max(1, static_cast<int>(height));
-  return absl::InvalidArgumentError("camera '" + printable(camera.name) + "' is so narrow that a picture of width " +
-                                    std::to_string(width) +
-                                    " would have more than 16384 rows; mend its aspectRatio or lower --width");
 }
 
 Vec3 camera_direction(const Camera& camera, float x, float y) {

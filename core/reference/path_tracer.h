@@ -45,9 +45,6 @@ Vec3 trace_path(const RayTracer& tracer, Vec3 origin, Vec3 direction, int bounce
 /// Irradiance at a point straight from the scene's punctual lights, shadowed, W/m².
 Vec3 direct_irradiance(const RayTracer& tracer, const ShadingPoint& point);
 
-/// Rows of a picture `width` pixels wide, width ÷ aspect. Fails above 16384: cameras come from files.
-absl::StatusOr<int> image_height(const Camera& camera, int width);
-
 /// Direction of the ray through (x, y) in [0,1]² of the image, row 0 at the top; unit.
 Vec3 camera_direction(const Camera& camera, float x, float y);
 

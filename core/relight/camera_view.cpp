@@ -34,7 +34,7 @@ absl::StatusOr<Image> render_view(const RayTracer& tracer, const SurfaceElements
   LL_ASSIGN_OR_RETURN(const int height, image_height(camera, options.width));
   Image image(options.width, height, {"R", "G", "B"});
   const ReceiverSearch search(tracer.scene(), elements.layout, elements.receivers);
-  const uint32_t side = std::max(1u, static_cast<uint32_t>(std::sqrt(static_cast<float>(options.samples))));
+  const uint32_t side = strata(options.samples);
   const bool done = parallel_for(static_cast<uint64_t>(height), options.parallel, [&](uint64_t row) {
     for (int x = 0; x < options.width; ++x) {
       Rng rng(hash_combine(row, static_cast<uint64_t>(x)));

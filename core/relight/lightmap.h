@@ -9,8 +9,9 @@
 
 namespace lightloom {
 
-/// R, G, B: E of the front side, or the back, W/m²; A: 1 at receivers; area: m² in the texel. Texels without a receiver next to one
-/// (gutters, texels inside solids) are filled from their neighbours, A = 0, so that bilinear filtering stays clean.
+/// R, G, B: E of the front side, or the back, W/m²; A: 1 at receivers; area: m² in the texel. Texels without a receiver
+/// next to one (gutters, texels inside solids) are filled from their neighbours, A = 0, so that bilinear filtering stays
+/// clean.
 Image lightmap_image(const SurfaceElements& elements, std::span<const Vec3> irradiance, bool back = false);
 
 /// Bilinear over the receivers of the hit's object and side around it; the nearest one if there is none.

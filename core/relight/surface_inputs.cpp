@@ -84,7 +84,7 @@ absl::StatusOr<SurfaceInputs> sample_surfaces(const RayTracer& tracer, const Sur
                                               bool direct, const Parallel& parallel) {
   const Scene& scene = tracer.scene();
   const size_t n = elements.receivers.all.size();
-  const uint32_t side = std::max(1u, static_cast<uint32_t>(std::sqrt(static_cast<float>(samples))));
+  const uint32_t side = strata(samples);
   SurfaceInputs out;
   if (direct) out.direct.resize(n);
   out.albedo.resize(n);

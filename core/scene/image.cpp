@@ -6,15 +6,15 @@
 
 #include "core/base/check.h"
 #include "core/base/file.h"
+#include "core/scene/srgb.h"
 
 namespace lightloom {
 namespace {
 
-/// Linear to sRGB (IEC 61966-2-1), 8 bits.
+/// Linear to sRGB, 8 bits.
 uint8_t srgb8(float linear) {
   const float c = linear > 0 ? std::min(linear, 1.0f) : 0.0f;  // NaN becomes 0
-  const float s = c <= 0.0031308f ? c * 12.92f : 1.055f * std::pow(c, 1 / 2.4f) - 0.055f;
-  return static_cast<uint8_t>(std::lround(s * 255));
+  return static_cast<uint8_t>(std::lround(to_srgb(c) * 255));
 }
 
 }  // namespace

@@ -1,8 +1,21 @@
 #include "core/scene/picture.h"
 
+#include <algorithm>
 #include <cmath>
+#include <string>
+
+#include "core/base/text.h"
 
 namespace lightloom {
+
+absl::StatusOr<int> image_height(const Camera& camera, int width) {
+  constexpr double kMaxHeight = 16384;
+  const double height = std::round(static_cast<double>(width) / static_cast<double>(camera.aspect));
+  if (height <= kMaxHeight) return std::max(1, static_cast<int>(height));
+  return absl::InvalidArgumentError("camera '" + printable(camera.name) + "' is so narrow that a picture of width " +
+                                    std::to_string(width) +
+                                    " would have more than 16384 rows; mend its aspectRatio or lower --width");
+}
 
 float expose(Image* image, float factor) {
   if (factor <= 0) {

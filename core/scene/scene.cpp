@@ -4,16 +4,18 @@
 #include <map>
 #include <utility>
 
+#include "core/scene/srgb.h"
+
 namespace lightloom {
 namespace {
 
-// sRGB (IEC 61966-2-1) to linear, per 8-bit value.
+// sRGB to linear, per 8-bit value.
 const std::array<float, 256>& srgb_table() {
   static const std::array<float, 256> table = [] {
     std::array<float, 256> t{};
     for (int i = 0; i < 256; ++i) {
       const double c = i / 255.0;
-      t[static_cast<size_t>(i)] = static_cast<float>(c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4));
+      t[static_cast<size_t>(i)] = static_cast<float>(from_srgb(c));
     }
     return t;
   }();

@@ -219,7 +219,7 @@ absl::StatusOr<Owned<VkDeviceMemory>> Gpu::allocate(const VkMemoryRequirements& 
   return absl::NotFoundError("the Vulkan device has no fitting memory; use another device or --device cpu");
 }
 
-absl::StatusOr<Buffer> Gpu::host_buffer(uint64_t bytes, VkBufferUsageFlags usage) const {
+absl::StatusOr<Buffer> Gpu::buffer(uint64_t bytes, VkBufferUsageFlags usage, bool host) const {
   Buffer buffer;
   buffer.bytes = std::max<uint64_t>(bytes, 16);
   auto info = vulkan_struct<VkBufferCreateInfo>(VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO);
@@ -230,35 +230,29 @@ absl::StatusOr<Buffer> Gpu::host_buffer(uint64_t bytes, VkBufferUsageFlags usage
   buffer.handle = {device_, handle, vkDestroyBuffer};
   VkMemoryRequirements need;
   vkGetBufferMemoryRequirements(device_, handle, &need);
-  LL_ASSIGN_OR_RETURN(buffer.memory, allocate(need, true));
+  LL_ASSIGN_OR_RETURN(buffer.memory, allocate(need, host));
   LL_VK_RETURN_IF_ERROR("vkBindBufferMemory", vkBindBufferMemory(device_, handle, buffer.memory.get(), 0));
-  LL_VK_RETURN_IF_ERROR("vkMapMemory", vkMapMemory(device_, buffer.memory.get(), 0, VK_WHOLE_SIZE, 0, &buffer.mapped));
   return buffer;
+}
+
+absl::StatusOr<Buffer> Gpu::host_buffer(uint64_t bytes, VkBufferUsageFlags usage) const {
+  LL_ASSIGN_OR_RETURN(Buffer host, buffer(bytes, usage, /*host=*/true));
+  LL_VK_RETURN_IF_ERROR("vkMapMemory", vkMapMemory(device_, host.memory.get(), 0, VK_WHOLE_SIZE, 0, &host.mapped));
+  return host;
 }
 
 absl::StatusOr<Buffer> Gpu::device_buffer(std::span<const uint8_t> data, VkBufferUsageFlags usage) {
   LL_ASSIGN_OR_RETURN(const Buffer staging, host_buffer(data.size(), VK_BUFFER_USAGE_TRANSFER_SRC_BIT));
   std::copy(data.begin(), data.end(), static_cast<uint8_t*>(staging.mapped));
 
-  Buffer buffer;
-  buffer.bytes = staging.bytes;
-  auto info = vulkan_struct<VkBufferCreateInfo>(VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO);
-  info.size = buffer.bytes;
-  info.usage = usage | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
-  VkBuffer handle = VK_NULL_HANDLE;
-  LL_VK_RETURN_IF_ERROR("vkCreateBuffer", vkCreateBuffer(device_, &info, nullptr, &handle));
-  buffer.handle = {device_, handle, vkDestroyBuffer};
-  VkMemoryRequirements need;
-  vkGetBufferMemoryRequirements(device_, handle, &need);
-  LL_ASSIGN_OR_RETURN(buffer.memory, allocate(need, false));
-  LL_VK_RETURN_IF_ERROR("vkBindBufferMemory", vkBindBufferMemory(device_, handle, buffer.memory.get(), 0));
+  LL_ASSIGN_OR_RETURN(Buffer out, buffer(staging.bytes, usage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, /*host=*/false));
   LL_RETURN_IF_ERROR(run([&](VkCommandBuffer commands) {
-    const VkBufferCopy all{0, 0, buffer.bytes};
-    vkCmdCopyBuffer(commands, staging.handle.get(), handle, 1, &all);
+    const VkBufferCopy all{0, 0, out.bytes};
+    vkCmdCopyBuffer(commands, staging.handle.get(), out.handle.get(), 1, &all);
     after_copies(commands);
     return absl::OkStatus();
   }));
-  return buffer;
+  return out;
 }
 
 absl::StatusOr<Texture2D> Gpu::texture(const TextureInfo& info) const {

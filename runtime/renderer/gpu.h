@@ -102,6 +102,7 @@ class Gpu {
   Gpu() = default;
   absl::Status create_instance(bool validation);
   absl::Status create_device();
+  absl::StatusOr<Buffer> buffer(uint64_t bytes, VkBufferUsageFlags usage, bool host) const;
   absl::StatusOr<Owned<VkDeviceMemory>> allocate(const VkMemoryRequirements& need, bool host) const;
 
   std::vector<std::string> own_messages_;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "core/base/sampling.h"
 #include "runtime/renderer/status.h"
 
 namespace lightloom::renderer {
@@ -225,8 +226,8 @@ Image Renderer::resolve(int width, int height, int side) const {
 
 absl::StatusOr<Image> Renderer::render(const Camera& camera, const PictureOptions& options,
                                        const std::function<absl::Status(VkCommandBuffer)>& between) {
-  const int height = std::max(1, static_cast<int>(std::lround(static_cast<float>(options.width) / camera.aspect)));
-  const int side = std::max(1, static_cast<int>(std::sqrt(static_cast<float>(options.samples))));
+  LL_ASSIGN_OR_RETURN(const int height, image_height(camera, options.width));
+  const int side = static_cast<int>(strata(options.samples));
   LL_RETURN_IF_ERROR(make_target(static_cast<uint32_t>(options.width * side), static_cast<uint32_t>(height * side)));
   LL_RETURN_IF_ERROR(update_lights());
   const gpu::FrameData frame{camera_matrix(camera),

@@ -24,31 +24,13 @@ size_t each_receiver(const PackedCell& cell, size_t most, Body body) {
 
 }  // namespace
 
-Cells::Cells(std::pmr::memory_resource* memory, const Manifest& manifest, uint32_t surface_elements)
-    : packed_(manifest.cells.size(), memory),
-      first_cell_(memory, manifest.probes.size() + 1),
-      missing_probes_(memory, manifest.cells.size()),
-      received_(memory, (size_t{surface_elements} + 63) / 64),
-      turns_(memory, static_cast<uint32_t>(manifest.cells.size())) {
-  // Counting sort of the (cell, probe) pairs by probe. first_cell_[p + 1] counts, then points at p's free place, which
-  // at the end is where p + 1 begins.
-  const auto each_pair = [&](auto body) {
-    for (uint32_t c = 0; c < manifest.cells.size(); ++c) {
-      const CellEntry& entry = manifest.cells[c];
-      for (uint32_t i = 0; i < entry.probes; ++i) body(c, manifest.cell_probes[entry.first_probe + i]);
-    }
-  };
-  uint64_t pairs = 0;
-  for (const CellEntry& entry : manifest.cells) pairs += entry.probes;
-  probe_cells_ = Array<uint32_t>(memory, pairs);
-  Array<uint32_t> next(memory, manifest.probes.size());
-  each_pair([&](uint32_t, uint32_t probe) { ++first_cell_[probe + 1]; });
-  for (size_t p = 0; p < manifest.probes.size(); ++p) {
-    next[p] = first_cell_[p];
-    first_cell_[p + 1] += first_cell_[p];
-  }
-  each_pair([&](uint32_t cell, uint32_t probe) { probe_cells_[next[probe]++] = cell; });
-  for (uint32_t c = 0; c < manifest.cells.size(); ++c) missing_probes_[c] = manifest.cells[c].probes;
+Cells::Cells(std::pmr::memory_resource* memory, const AssetIndex& index)
+    : index_(index),
+      packed_(index.cells().size(), memory),
+      missing_probes_(memory, index.cells().size()),
+      received_(memory, (size_t{index.surface_elements()} + 63) / 64),
+      turns_(memory, static_cast<uint32_t>(index.cells().size())) {
+  for (uint32_t c = 0; c < index.cells().size(); ++c) missing_probes_[c] = index.cells()[c].probes;
 }
 
 bool Cells::claim(const PackedCell& cell) {
@@ -103,7 +85,7 @@ void Cells::unload(uint32_t cell) {
 }
 
 void Cells::probe_loaded(uint32_t probe) {
-  for (const uint32_t c : cells_of(probe)) {
+  for (const uint32_t c : index_.cells_of(probe)) {
     --missing_probes_[c];
     if (!active(c)) continue;
     ++active_;
@@ -112,7 +94,7 @@ void Cells::probe_loaded(uint32_t probe) {
 }
 
 void Cells::probe_unloaded(uint32_t probe) {
-  for (const uint32_t c : cells_of(probe)) {
+  for (const uint32_t c : index_.cells_of(probe)) {
     active_ -= active(c);
     turns_.remove(c);
     ++missing_probes_[c];
@@ -120,7 +102,7 @@ void Cells::probe_unloaded(uint32_t probe) {
 }
 
 void Cells::lambda_changed(uint32_t probe) {
-  for (const uint32_t c : cells_of(probe)) {
+  for (const uint32_t c : index_.cells_of(probe)) {
     if (active(c)) turns_.add(c);
   }
 }

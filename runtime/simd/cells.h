@@ -11,7 +11,7 @@ namespace lightloom::simd {
 class Cells {
  public:
   /// No cell is resident.
-  Cells(std::pmr::memory_resource* memory, const Manifest& manifest, uint32_t surface_elements);
+  Cells(std::pmr::memory_resource* memory, const AssetIndex& index);
 
   bool resident(uint32_t cell) const { return packed_[cell].clusters.size() != 0; }
   uint32_t resident_count() const { return resident_; }
@@ -42,16 +42,12 @@ class Cells {
 
  private:
   bool active(uint32_t cell) const { return resident(cell) && missing_probes_[cell] == 0; }
-  std::span<const uint32_t> cells_of(uint32_t probe) const {
-    return {probe_cells_.data() + first_cell_[probe], first_cell_[probe + 1] - first_cell_[probe]};
-  }
   /// Sets or clears the receivers' bits; false, and nothing is set, if one is set already.
   bool claim(const PackedCell& cell);
   void release(const PackedCell& cell);
 
+  const AssetIndex& index_;
   std::pmr::vector<PackedCell> packed_;
-  Array<uint32_t> first_cell_;  ///< per probe and one more: range of probe_cells_
-  Array<uint32_t> probe_cells_;
   Array<uint32_t> missing_probes_;  ///< per cell: entries of its probe list that are not resident
   Array<uint64_t> received_;        ///< bit per surface element: a receiver of a resident cell
   Turns turns_;

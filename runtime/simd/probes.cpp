@@ -41,15 +41,15 @@ bool intersect(const Array<uint64_t>& a, const Array<uint64_t>& b) {
 
 }  // namespace
 
-Probes::Probes(std::pmr::memory_resource* memory, const Manifest& manifest, uint32_t surface_elements)
-    : rays_(static_cast<uint32_t>(manifest.params.relight_rays)),
-      lambda_stride_(lambda_stride_of(manifest.params.order)),
-      packed_(manifest.probes.size(), memory),
-      sh_(sh_table(memory, manifest.params.order, manifest.probes.empty() ? 0 : rays_)),
-      lambda_(memory, manifest.probes.size() * 3 * lambda_stride_),
-      flags_(memory, manifest.probes.size()),
-      turns_(memory, static_cast<uint32_t>(manifest.probes.size())) {
-  LL_CHECK(rays_ > 0 && surface_elements <= 1u << 31);
+Probes::Probes(std::pmr::memory_resource* memory, const AssetIndex& index)
+    : rays_(index.rays()),
+      lambda_stride_(lambda_stride_of(static_cast<int>(index.order()))),
+      packed_(index.probes().size(), memory),
+      sh_(sh_table(memory, static_cast<int>(index.order()), index.probes().empty() ? 0 : rays_)),
+      lambda_(memory, index.probes().size() * 3 * lambda_stride_),
+      flags_(memory, index.probes().size()),
+      turns_(memory, static_cast<uint32_t>(index.probes().size())) {
+  LL_CHECK(rays_ > 0 && index.surface_elements() <= 1u << 31);
   bytes_ = sh_.bytes() + lambda_.bytes();
 }
 

@@ -11,7 +11,7 @@ namespace lightloom::simd {
 class Probes {
  public:
   /// No probe is resident; λ = 0.
-  Probes(std::pmr::memory_resource* memory, const Manifest& manifest, uint32_t surface_elements);
+  Probes(std::pmr::memory_resource* memory, const AssetIndex& index);
 
   bool resident(uint32_t probe) const { return packed_[probe].elements.size() != 0; }
   uint32_t resident_count() const { return resident_; }

@@ -14,15 +14,15 @@ double steady_milliseconds() {
 
 }  // namespace
 
-SimdRuntime::SimdRuntime(const Manifest& manifest, uint32_t surface_elements, const SimdOptions& options)
+SimdRuntime::SimdRuntime(const AssetIndex& index, const SimdOptions& options)
     : memory_(options.memory != nullptr ? options.memory : std::pmr::new_delete_resource()),
       kernels_(options.kernels != nullptr ? options.kernels : &simd::best_kernels()),
       milliseconds_(options.milliseconds != nullptr ? options.milliseconds : steady_milliseconds),
       smoothing_(options.smoothing),
       pool_(options.threads),
-      surface_(memory_, surface_elements, options.smoothing),
-      probes_(memory_, manifest, surface_elements),
-      cells_(memory_, manifest, surface_elements) {}
+      surface_(memory_, index.surface_elements(), options.smoothing),
+      probes_(memory_, index),
+      cells_(memory_, index) {}
 
 absl::Status SimdRuntime::load_cell(uint32_t cell, simd::PackedCell packed) {
   const std::lock_guard lock(mutex_);

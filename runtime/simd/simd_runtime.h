@@ -58,8 +58,8 @@ struct SimdCounts {
 /// Memory that cannot be had throws std::bad_alloc and leaves everything as it was; update() allocates nothing.
 class SimdRuntime {
  public:
-  /// Nothing is resident, all inputs and E are 0. REQUIRES: manifest and number of surface elements are AssetSource's.
-  SimdRuntime(const Manifest& manifest, uint32_t surface_elements, const SimdOptions& options);
+  /// Nothing is resident, all inputs and E are 0. Keeps a reference to the index.
+  SimdRuntime(const AssetIndex& index, const SimdOptions& options);
 
   /// REQUIRES: the cell and the rays are AssetSource's, of the same manifest.
   simd::PackedCell pack_cell(const SourceCell& cell) const { return simd::pack_cell(cell, memory_); }

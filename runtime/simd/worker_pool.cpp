@@ -1,25 +1,30 @@
 #include "runtime/simd/worker_pool.h"
 
 #include <algorithm>
+#include <system_error>
 
 namespace lightloom::simd {
 
 WorkerPool::WorkerPool(int threads) {
   const unsigned count =
       threads > 0 ? static_cast<unsigned>(threads) : std::max(1u, std::thread::hardware_concurrency());
-  for (unsigned i = 1; i < count; ++i) {
-    workers_.emplace_back([this] {
-      std::unique_lock lock(mutex_);
-      for (uint64_t seen = 0;;) {
-        wake_.wait(lock, [&] { return ending_ || round_ != seen; });
-        if (ending_) return;
-        seen = round_;
-        lock.unlock();
-        work();
-        lock.lock();
-        if (--running_ == 0) finished_.notify_one();
-      }
-    });
+  workers_.reserve(count - 1);
+  try {
+    for (unsigned i = 1; i < count; ++i) workers_.emplace_back([this] { wait_and_work(); });
+  } catch (const std::system_error&) {  // as parallel_for: those that there are do the work
+  }
+}
+
+void WorkerPool::wait_and_work() {
+  std::unique_lock lock(mutex_);
+  for (uint64_t seen = 0;;) {
+    wake_.wait(lock, [&] { return ending_ || round_ != seen; });
+    if (ending_) return;
+    seen = round_;
+    lock.unlock();
+    work();
+    lock.lock();
+    if (--running_ == 0) finished_.notify_one();
   }
 }
 

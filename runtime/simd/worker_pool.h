@@ -14,7 +14,7 @@ namespace lightloom::simd {
 
 class WorkerPool {
  public:
-  /// The calling thread is one of `threads`; 0: one per hardware thread.
+  /// The calling thread is one of `threads`; 0: one per hardware thread. Fewer if the system has no more.
   explicit WorkerPool(int threads);
   ~WorkerPool();
   WorkerPool(const WorkerPool&) = delete;
@@ -25,6 +25,7 @@ class WorkerPool {
   void run(uint32_t tasks, absl::FunctionRef<void(uint32_t)> task);
 
  private:
+  void wait_and_work();
   void work();
 
   std::mutex mutex_;

@@ -17,20 +17,6 @@ void append(std::pmr::vector<uint8_t>* to, const T* values, size_t count) {
   to->insert(to->end(), bytes, bytes + count * sizeof(T));
 }
 
-/// As surface chunks store normals (docs/asset-format.md).
-uint32_t octahedral(Vec3 n) {
-  const float sum = std::abs(n.x) + std::abs(n.y) + std::abs(n.z);
-  float u = n.x / sum, v = n.y / sum;
-  if (n.z < 0) {
-    const float a = (1 - std::abs(v)) * (u < 0 ? -1.0f : 1.0f), b = (1 - std::abs(u)) * (v < 0 ? -1.0f : 1.0f);
-    u = a, v = b;
-  }
-  const auto snorm = [](float x) {
-    return static_cast<uint32_t>(static_cast<uint16_t>(static_cast<int16_t>(std::floor(32767 * x + 0.5f))));
-  };
-  return snorm(u) | snorm(v) << 16;
-}
-
 }  // namespace
 
 absl::Status VulkanAsset::load_chunk(const Digest& digest, std::span<const uint8_t> bytes) {
@@ -42,20 +28,24 @@ absl::Status VulkanAsset::load_chunk(const Digest& digest, std::span<const uint8
                                                                       : cells_[target.index].resident;
     if (resident) return absl::OkStatus();
   }
+  const auto keys = [this](uint32_t object) {
+    const std::lock_guard lock(mutex_);
+    return surfaces_[object].keys;
+  };
   switch (target.kind) {
     case AssetIndex::Kind::kSurface: {
       LL_ASSIGN_OR_RETURN(const SurfaceChunk chunk, index_.surface(target.index, bytes));
       return load_surface(target.index, chunk);
     }
     case AssetIndex::Kind::kRelight: {
-      LL_ASSIGN_OR_RETURN(const RelightChunk chunk, index_.relight(target.index, bytes));
-      return load_relight(target.index, chunk);
+      LL_ASSIGN_OR_RETURN(const auto rays, resolve_relight(index_, target.index, bytes, keys));
+      return load_relight(target.index, rays);
     }
     case AssetIndex::Kind::kCell:
       break;
   }
-  LL_ASSIGN_OR_RETURN(CellChunk chunk, index_.cell(target.index, bytes));
-  return load_cell(target.index, std::move(chunk));
+  LL_ASSIGN_OR_RETURN(const SourceCell source, resolve_cell(index_, target.index, bytes, keys));
+  return load_cell(target.index, source);
 }
 
 absl::Status VulkanAsset::unload_chunk(const Digest& digest) {
@@ -87,7 +77,7 @@ absl::Status VulkanAsset::load_surface(uint32_t object, const SurfaceChunk& chun
     // Radius 0 would mean that the element is not resident.
     const float radius = std::max(1e-6f, 0.5f * std::sqrt(std::max(0.0f, chunk.areas[i])));
     const float point[] = {p.x, p.y, p.z, radius};
-    const uint32_t normal = octahedral(chunk.normals[i]);
+    const uint32_t normal = encode_normal(chunk.normals[i]);
     append(&points, point, 4);
     append(&normals, &normal, 1);
   }
@@ -129,15 +119,7 @@ void VulkanAsset::unload_surface(uint32_t object) {
   surfaces_[object].keys = nullptr;
 }
 
-absl::StatusOr<std::vector<SurfaceKeys>> VulkanAsset::keys_of(const std::vector<uint32_t>& objects) const {
-  const std::lock_guard lock(mutex_);
-  return keys_of_objects(index_, objects, [&](uint32_t o) { return surfaces_[o].keys; });
-}
-
-absl::Status VulkanAsset::load_relight(uint32_t probe, const RelightChunk& chunk) {
-  LL_ASSIGN_OR_RETURN(const std::vector<uint32_t> objects, index_.objects_of(chunk.objects));
-  LL_ASSIGN_OR_RETURN(const std::vector<SurfaceKeys> keys, keys_of(objects));
-  LL_ASSIGN_OR_RETURN(const std::vector<uint32_t> rays, index_.elements(chunk, objects, keys));
+absl::Status VulkanAsset::load_relight(uint32_t probe, const std::vector<uint32_t>& rays) {
   // What the probe sees, by tiles.
   std::vector<uint32_t> tiles(tile_words_);
   for (const uint32_t ray : rays) {
@@ -174,22 +156,15 @@ void VulkanAsset::unload_relight(uint32_t probe) {
   uploads_.cancel({AssetIndex::Kind::kRelight, probe});
   if (p.uploaded) {
     write_slot(p.slot, gpu::kNoProbe);
-    for (uint32_t i = first_cell_[probe]; i < first_cell_[probe + 1]; ++i) {
-      ++cells_[cells_of_[i]].missing;
-      refresh_cell(cells_of_[i]);
+    for (const uint32_t c : index_.cells_of(probe)) {
+      ++cells_[c].missing;
+      refresh_cell(c);
     }
   }
   p = {};
 }
 
-absl::Status VulkanAsset::load_cell(uint32_t cell, CellChunk chunk) {
-  SourceCell source;
-  source.chunk = std::move(chunk);
-  LL_ASSIGN_OR_RETURN(const std::vector<uint32_t> objects, index_.objects_of(source.chunk.objects));
-  LL_ASSIGN_OR_RETURN(const std::vector<SurfaceKeys> keys, keys_of(objects));
-  LL_ASSIGN_OR_RETURN(source.elements, index_.elements(source.chunk, objects, keys));
-  const auto probes = index_.probes_of(cell);
-  source.probes.assign(probes.begin(), probes.end());
+absl::Status VulkanAsset::load_cell(uint32_t cell, const SourceCell& source) {
   LL_ASSIGN_OR_RETURN(CellBlock block, make_cell_block(source, context_->page_bytes, memory_));
   std::pmr::vector<uint32_t> elements(source.elements.begin(), source.elements.end(), memory_);
 
@@ -262,9 +237,9 @@ void VulkanAsset::uploaded(AssetIndex::Target target) {
     Probe& p = probes_[target.index];
     p.uploaded = true;
     write_slot(p.slot, target.index);
-    for (uint32_t i = first_cell_[target.index]; i < first_cell_[target.index + 1]; ++i) {
-      --cells_[cells_of_[i]].missing;
-      refresh_cell(cells_of_[i]);
+    for (const uint32_t c : index_.cells_of(target.index)) {
+      --cells_[c].missing;
+      refresh_cell(c);
     }
   }
 }
@@ -333,14 +308,7 @@ bool VulkanAsset::uploads_pending() const {
 
 void VulkanAsset::fill_counts(lightloom_counts* out) const {
   const std::lock_guard lock(mutex_);
-  out->surface_elements = index_.surface_elements();
-  for (const AssetIndex::Cell& c : index_.cells()) out->receivers += c.receivers;
-  out->probes = static_cast<uint32_t>(probes_.size());
-  out->cells = static_cast<uint32_t>(cells_.size());
-  out->clusters = index_.clusters();
-  out->sh_order = index_.order();
-  out->image_width = index_.width();
-  out->image_height = index_.height();
+  *out = counts_of(index_);
   for (const Surface& s : surfaces_) out->resident_surfaces += s.keys != nullptr;
   for (const Probe& p : probes_) out->resident_probes += p.resident;
   for (const Cell& c : cells_) {

@@ -86,15 +86,13 @@ class VulkanAsset {
               std::pmr::memory_resource* memory);
   absl::Status create_arrays();
   absl::Status create_sets();
-  void list_cells_of_probes();
 
   absl::Status load_surface(uint32_t object, const SurfaceChunk& chunk);
-  absl::Status load_relight(uint32_t probe, const RelightChunk& chunk);
-  absl::Status load_cell(uint32_t cell, CellChunk chunk);
+  absl::Status load_relight(uint32_t probe, const std::vector<uint32_t>& rays);
+  absl::Status load_cell(uint32_t cell, const SourceCell& source);
   void unload_surface(uint32_t object);
   void unload_relight(uint32_t probe);
   void unload_cell(uint32_t cell);
-  absl::StatusOr<std::vector<SurfaceKeys>> keys_of(const std::vector<uint32_t>& objects) const;
   absl::Status mark_received(uint32_t cell, const std::vector<uint32_t>& elements);
   void uploaded(AssetIndex::Target target);
   void write_slot(uint32_t slot, uint32_t probe);
@@ -108,7 +106,7 @@ class VulkanAsset {
   void record_clears(VkCommandBuffer commands);
   absl::Status record_direct(VkCommandBuffer commands, const lightloom_frame_info& info, uint32_t frame,
                              FrameMemory* memory);
-  void record_radiosity(VkCommandBuffer commands, const lightloom_frame_info& info, uint32_t frame);
+  void record_radiosity(VkCommandBuffer commands, uint32_t frame);
   void record_select_and_relight(VkCommandBuffer commands, uint32_t frame, FrameMemory* memory);
   void record_cells(VkCommandBuffer commands, uint32_t frame, FrameMemory* memory);
   void record_settle(VkCommandBuffer commands);
@@ -141,8 +139,7 @@ class VulkanAsset {
   std::pmr::vector<Surface> surfaces_;
   std::pmr::vector<Probe> probes_;
   std::pmr::vector<Cell> cells_;
-  std::pmr::vector<uint32_t> first_cell_, cells_of_;  ///< of each probe, the cells that read it
-  std::pmr::vector<bool> received_;                   ///< per surface element
+  std::pmr::vector<bool> received_;  ///< per surface element
   std::unique_ptr<LightmapMap> map_;
   uint32_t map_layers_ = 1;
   UploadQueue uploads_;

@@ -27,8 +27,6 @@ VulkanAsset::VulkanAsset(Context* context, const Pipelines* pipelines, AssetInde
       surfaces_(index_.objects().size(), memory),
       probes_(index_.probes().size(), memory),
       cells_(memory),
-      first_cell_(memory),
-      cells_of_(memory),
       received_(index_.surface_elements(), false, memory),
       uploads_(memory),
       graves_(memory) {
@@ -39,23 +37,9 @@ absl::StatusOr<std::unique_ptr<VulkanAsset>> VulkanAsset::create(Context* contex
                                                                  AssetIndex index, const AssetOptions& options,
                                                                  std::pmr::memory_resource* memory) {
   std::unique_ptr<VulkanAsset> asset(new VulkanAsset(context, pipelines, std::move(index), options, memory));
-  asset->list_cells_of_probes();
   LL_RETURN_IF_ERROR(asset->create_arrays());
   LL_RETURN_IF_ERROR(asset->create_sets());
   return asset;
-}
-
-void VulkanAsset::list_cells_of_probes() {
-  first_cell_.assign(probes_.size() + 1, 0);
-  for (uint32_t c = 0; c < index_.cells().size(); ++c) {
-    for (const uint32_t p : index_.probes_of(c)) ++first_cell_[p + 1];
-  }
-  for (size_t p = 0; p < probes_.size(); ++p) first_cell_[p + 1] += first_cell_[p];
-  cells_of_.resize(first_cell_.back());
-  std::pmr::vector<uint32_t> next(first_cell_.begin(), first_cell_.end(), memory_);
-  for (uint32_t c = 0; c < index_.cells().size(); ++c) {
-    for (const uint32_t p : index_.probes_of(c)) cells_of_[next[p]++] = c;
-  }
 }
 
 absl::Status VulkanAsset::create_arrays() {

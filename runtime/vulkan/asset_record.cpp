@@ -126,7 +126,7 @@ absl::Status VulkanAsset::record(VkCommandBuffer commands, const lightloom_frame
   memory->time(commands, frame, Step::kUpload);
   LL_RETURN_IF_ERROR(record_direct(commands, info, frame, memory));
   memory->time(commands, frame, Step::kDirect);
-  record_radiosity(commands, info, frame);
+  record_radiosity(commands, frame);
   barrier_between(*context_, commands);
   memory->time(commands, frame, Step::kRadiosity);
   record_select_and_relight(commands, frame, memory);
@@ -223,7 +223,7 @@ absl::Status VulkanAsset::record_direct(VkCommandBuffer commands, const lightloo
   return absl::OkStatus();
 }
 
-void VulkanAsset::record_radiosity(VkCommandBuffer commands, const lightloom_frame_info&, uint32_t frame) {
+void VulkanAsset::record_radiosity(VkCommandBuffer commands, uint32_t frame) {
   const uint32_t S = index_.surface_elements(), f = frame % context_->frames;
   VkDescriptorBufferInfo& bound = bound_direct_[f];
   if (bound.buffer != direct_source_.buffer || bound.offset != direct_source_.offset) {

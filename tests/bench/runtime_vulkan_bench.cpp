@@ -17,7 +17,6 @@ namespace {
 using bench::RepeatedPass;
 
 constexpr int kRepeats = 9;
-constexpr uint32_t kMoreDispatches = 4;
 
 /// Milliseconds of all threads.
 template <class F>

@@ -8,7 +8,7 @@
 namespace lightloom::testing {
 
 std::unique_ptr<SimdRuntime> simd_runtime(const AssetSource& source, const SimdOptions& options) {
-  auto runtime = std::make_unique<SimdRuntime>(source.manifest(), source.surface_elements(), options);
+  auto runtime = std::make_unique<SimdRuntime>(source.index(), options);
   LL_CHECK(load_all(source, runtime.get()).ok());
   return runtime;
 }

@@ -20,7 +20,7 @@ class Streaming : public ::testing::Test {
     light_ = testing::random_light(source_->surface_elements(), 3);
     cells_ = static_cast<uint32_t>(source_->manifest().cells.size());
     probes_ = static_cast<uint32_t>(source_->manifest().probes.size());
-    runtime_.emplace(source_->manifest(), source_->surface_elements(), SimdOptions{});
+    runtime_.emplace(source_->index(), SimdOptions{});
     testing::set_light(light_, &*runtime_);
   }
   void load_cell(uint32_t c) { ASSERT_TRUE(runtime_->load_cell(c, runtime_->pack_cell(*source_->cell(c))).ok()); }

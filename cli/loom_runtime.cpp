@@ -1,0 +1,62 @@
+#include "cli/loom_runtime.h"
+
+#include <algorithm>
+
+#include "core/asset/asset.h"
+#include "core/base/file.h"
+
+namespace lightloom {
+namespace {
+
+int read_chunk(void* user, const uint8_t digest[32], uint64_t size, void* out) {
+  ChunkRef ref;
+  std::copy(digest, digest + 32, ref.digest.bytes.begin());
+  ref.size = size;
+  const auto bytes = static_cast<const ChunkStore*>(user)->get(ref);
+  if (!bytes.ok()) return 1;
+  std::copy(bytes->begin(), bytes->end(), static_cast<uint8_t*>(out));
+  return 0;
+}
+
+}  // namespace
+
+void RuntimeMessages::receive(void* user, lightloom_message_kind kind, const char* text) {
+  auto* self = static_cast<RuntimeMessages*>(user);
+  if (kind == LIGHTLOOM_MESSAGE_VALIDATION) ++self->validation_;
+  self->newest_ = text;
+}
+
+absl::Status RuntimeMessages::status(lightloom_result result) const {
+  if (result == LIGHTLOOM_OK && validation_ == 0) return absl::OkStatus();
+  return absl::UnavailableError("runtime: " + (newest_.empty() ? lightloom_result_string(result) : newest_));
+}
+
+absl::Status load_loom(const std::filesystem::path& loom, const RuntimeMessages& messages, lightloom_runtime* runtime) {
+  LL_ASSIGN_OR_RETURN(const auto manifest, read_file(loom / "manifest"));
+  ChunkStore store = chunk_store(loom);
+  lightloom_asset_info asset{};
+  asset.struct_size = sizeof asset;
+  asset.manifest = manifest.data();
+  asset.manifest_bytes = manifest.size();
+  asset.read_chunk = read_chunk;
+  asset.read_user = &store;
+  return messages.status(lightloom_load(runtime, &asset));
+}
+
+absl::Status set_albedo_emission_sky(const SurfaceInputs& inputs, Vec3 environment, const RuntimeMessages& messages,
+                                     lightloom_runtime* runtime) {
+  const float sky[3] = {environment.x, environment.y, environment.z};
+  LL_RETURN_IF_ERROR(messages.status(lightloom_set_albedo(runtime, floats(inputs.albedo), 0, inputs.albedo.size())));
+  LL_RETURN_IF_ERROR(
+      messages.status(lightloom_set_emission(runtime, floats(inputs.emission), 0, inputs.emission.size())));
+  return messages.status(lightloom_set_environment(runtime, sky));
+}
+
+absl::StatusOr<PlayTimes> play_times(const RuntimeMessages& messages, lightloom_runtime* runtime) {
+  lightloom_stats stats{};
+  stats.struct_size = sizeof stats;
+  LL_RETURN_IF_ERROR(messages.status(lightloom_get_stats(runtime, &stats)));
+  return PlayTimes{stats.radiosity_ms, stats.select_ms + stats.relight_ms, stats.project_ms, stats.receive_ms};
+}
+
+}  // namespace lightloom
