@@ -168,6 +168,7 @@ struct ReceivePush {
 struct SettlePush {
   uint values;  // 3·S
   float alpha;
+  float arrived, black;  // runtime/rounding.h
 };
 struct ImagePush {
   uint width, height, layers;

@@ -1,4 +1,4 @@
-// Smoothing: E goes the share alpha of the way to what the receive pass found.
+// Smoothing: E goes the share alpha of the way to what the receive pass found, and the whole of the last step.
 #version 450
 #include "layout.h"
 
@@ -9,6 +9,8 @@ layout(std430, binding = 1) buffer Irradiance { float irradiance[]; };
 void main() {
   const uint i = invocation_index();
   if (i >= push.values) return;
-  const float e = irradiance[i];
-  irradiance[i] = push.alpha == 1.0 ? target[i] : e + push.alpha * (target[i] - e);
+  const float to = target[i];
+  const float left = to - irradiance[i];
+  const bool arrives = push.alpha >= 1.0 || abs(left) <= push.arrived * max(abs(to), push.black);
+  irradiance[i] = arrives ? to : irradiance[i] + push.alpha * left;
 }

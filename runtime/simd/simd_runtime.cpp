@@ -4,6 +4,7 @@
 #include <chrono>
 
 #include "core/base/check.h"
+#include "runtime/rounding.h"
 
 namespace lightloom {
 namespace {

@@ -20,16 +20,12 @@ struct SimdOptions {
   double (*milliseconds)() = nullptr;           ///< for SimdStats; null: a steady clock
 };
 
-/// Relative change that may be mere rounding.
-inline constexpr float kRounding = 0x1p-19f;
-
 /// How much one frame may do. By default everything that changed, exactly, at once.
 struct SimdFrameOptions {
   uint32_t max_probes = 0;  ///< that are relit, in turn; 0: all that saw a change
   uint32_t max_cells = 0;   ///< whose E is computed, in turn; 0: all with a relit probe
   /// Relative change of a colour of a surface element's radiance that counts. Below `epsilon_floor` a change is compared
-  /// with epsilon · epsilon_floor instead. Changes below kRounding never count: feedback would shift the last bits for
-  /// ever.
+  /// with epsilon · epsilon_floor instead. Changes below kRounding (runtime/rounding.h) never count.
   float epsilon = 0, epsilon_floor = 0;
   float smoothing = 1;  ///< E goes this share of the way to its new value, (0, 1]
 };

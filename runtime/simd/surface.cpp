@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "core/base/sh.h"
+#include "runtime/rounding.h"
 
 namespace lightloom::simd {
 namespace {
@@ -151,14 +152,12 @@ void Surface::smooth(WorkerPool* pool, float share) {
 
 /// Returns whether any E is still on its way.
 bool Surface::smooth_tile(uint32_t tile, float share) {
-  // Nearer than this nobody sees the last step, and rounding would stop smaller ones.
-  constexpr float kNear = 0x1p-12f, kNearBlack = 0x1p-20f;
   float* const e = irradiance_.data() + size_t{tile} * kTileFloats;
   const float* const target = target_.data() + size_t{tile} * kTileFloats;
   bool moving = false;
   for (uint32_t i = 0; i < kTileFloats; ++i) {
     const float left = target[i] - e[i];
-    const bool arrives = share >= 1 || std::abs(left) <= kNear * std::max(std::abs(target[i]), kNearBlack);
+    const bool arrives = share >= 1 || std::abs(left) <= kArrived * std::max(std::abs(target[i]), kArrivedBlack);
     e[i] = arrives ? target[i] : e[i] + share * left;
     moving |= !arrives;
   }

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "runtime/rounding.h"
 #include "runtime/vulkan/asset.h"
 #include "runtime/vulkan/barriers.h"
 
@@ -239,7 +240,7 @@ void VulkanAsset::record_radiosity(VkCommandBuffer commands, uint32_t frame) {
   }
   gpu::RadiosityPush push{};
   push.elements = S;
-  push.epsilon = settings_.options.epsilon;
+  push.epsilon = std::max(settings_.options.epsilon, kRounding);
   push.floor = settings_.options.epsilon_floor;
   push.tile_shift = tile_shift_;
   push.sky_tile = sky_changed_ ? sky_tile_ : kNoSky;
@@ -325,7 +326,8 @@ void VulkanAsset::record_cells(VkCommandBuffer commands, uint32_t frame, FrameMe
 void VulkanAsset::record_settle(VkCommandBuffer commands) {
   const uint32_t values = 3 * index_.surface_elements();
   if (values > 0) {
-    pipelines_->bind(commands, Pass::kSettle, settle_, gpu::SettlePush{values, settings_.options.smoothing});
+    pipelines_->bind(commands, Pass::kSettle, settle_,
+                     gpu::SettlePush{values, settings_.options.smoothing, kArrived, kArrivedBlack});
     pipelines_->dispatch(commands, pipelines_->groups_of(values));
     barrier_between(*context_, commands);
   }

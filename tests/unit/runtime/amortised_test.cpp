@@ -185,6 +185,23 @@ TEST_F(Amortised, SmoothingGoesAShareOfTheWay) {
   EXPECT_LT(p999_error(runtime_.irradiance(), expected), 1e-5);
 }
 
+TEST_F(Amortised, SmoothingArrives) {
+  for (Vec3& a : light_.albedo) a = {};
+  start();
+  settle();
+  const std::vector<Vec3> before = runtime_.irradiance();
+  const SurfaceLight dim = light_;
+  SurfaceLight bright = light_;
+  for (Vec3& l : bright.emission) l *= 3;
+  runtime_.light(bright);
+  ASSERT_EQ(lightloom_update(runtime_.get(), 1), LIGHTLOOM_OK);
+  ASSERT_NE(runtime_.irradiance(), before);
+  runtime_.light(dim);
+  runtime_.options(0, 0, 0, 0.25f);
+  ASSERT_EQ(lightloom_update(runtime_.get(), 60), LIGHTLOOM_OK);
+  EXPECT_EQ(runtime_.irradiance(), before);
+}
+
 class Streaming : public Amortised {
  protected:
   lightloom_result load_chunk(const Digest& digest) {
