@@ -14,7 +14,7 @@ namespace lightloom {
 namespace {
 
 constexpr uint32_t kMagic = 0x4d4f4f4cu;  // "LOOM"
-constexpr uint32_t kVersion = 1;
+constexpr uint32_t kVersion = 2;
 
 struct Header {
   uint32_t magic, version;
@@ -55,7 +55,7 @@ struct ClusterRecord {
   uint32_t receivers, rank, probes;
   float error;
 };
-static_assert(sizeof(BakeParams) == 48 && sizeof(Header) == 152 && sizeof(ObjectRecord) == 96 &&
+static_assert(sizeof(BakeParams) == 56 && sizeof(Header) == 160 && sizeof(ObjectRecord) == 96 &&
               sizeof(ProbeRecord) == 72 && sizeof(CellRecord) == 112 && sizeof(ClusterRecord) == 40);
 
 uint32_t crc(std::span<const uint8_t> bytes) {
@@ -73,9 +73,10 @@ absl::Status corrupt(std::string_view why) {
 }
 
 bool valid(const BakeParams& p) {
-  return p.order >= 0 && p.order <= kMaxShOrder && p.spacing > 0 && std::isfinite(p.spacing) && p.links >= 1 &&
-         p.rays >= 1 && p.relight_rays >= 1 && p.max_rank >= 0 && p.threshold >= 0 && std::isfinite(p.threshold) &&
-         p.cell_receivers >= 1 && p.texels_per_metre >= 0 && std::isfinite(p.texels_per_metre) && p.lightmap_size >= 0;
+  return p.method <= BakeMethod::kSl17 && p.probes >= 0 && p.order >= 0 && p.order <= kMaxShOrder && p.spacing > 0 &&
+         std::isfinite(p.spacing) && p.links >= 1 && p.rays >= 1 && p.relight_rays >= 1 && p.max_rank >= 0 &&
+         p.threshold >= 0 && std::isfinite(p.threshold) && p.cell_receivers >= 1 && p.texels_per_metre >= 0 &&
+         std::isfinite(p.texels_per_metre) && p.lightmap_size >= 0;
 }
 
 bool is_finite(const Aabb& box) { return is_finite(box.lo) && is_finite(box.hi); }
@@ -101,7 +102,6 @@ absl::Status validate(const Manifest& m) {
   }
   for (const ProbeEntry& p : m.probes) {
     if (!is_finite(p.position)) return corrupt("a probe's position is not finite");
-    if (p.slot > 8) return corrupt("a probe's slot is out of range");
   }
   uint32_t cluster = 0;
   for (const CellEntry& c : m.cells) {
@@ -189,7 +189,8 @@ absl::StatusOr<Manifest> decode_manifest(std::span<const uint8_t> bytes) {
   if (header.magic != kMagic) return corrupt("it does not start with LOOM");
   if (header.version != kVersion) {
     return absl::UnimplementedError("manifest has version " + std::to_string(header.version) +
-                                    ", this program reads version 1; use a newer lightloom");
+                                    ", this program reads version " + std::to_string(kVersion) +
+                                    "; bake again, or use the lightloom that fits");
   }
   uint32_t sum = 0;
   std::memcpy(&sum, bytes.data() + body.size(), 4);

@@ -14,12 +14,19 @@
 
 namespace lightloom {
 
+enum class BakeMethod : uint32_t {
+  kDefault,
+  kSl17,  ///< Silvennoinen & Lehtinen 2017 as published: the baseline
+};
+
 /// Everything that the baked numbers depend on besides the scene. Recorded in the asset; a rebake uses the same.
 struct BakeParams {
+  BakeMethod method = BakeMethod::kDefault;
   int32_t order = 7;              ///< SH order n of the probes
   float spacing = 0;              ///< ρ, side of a probe cell, metres; 0 in a request: chosen from the scene
-  int32_t links = 6;              ///< k, probes per receiver
-  int32_t rays = 256;             ///< gather rays per receiver, a square number
+  int32_t probes = 0;             ///< SL17: how many; 0: from the spacing
+  int32_t links = 6;              ///< k, probes per receiver; SL17: N_overlap, on average
+  int32_t rays = 256;             ///< gather rays per receiver
   int32_t relight_rays = 4096;    ///< per probe
   int32_t max_rank = 32;          ///< coefficients per cluster, without the uniform one
   float threshold = 0.02f;        ///< relative Frobenius error at which a cluster's rank ends
@@ -30,6 +37,15 @@ struct BakeParams {
 
   bool operator==(const BakeParams&) const = default;
 };
+/// As SL17 Sec. 4.1 and 5 have it.
+inline BakeParams sl17_params() {
+  BakeParams p;
+  p.method = BakeMethod::kSl17;
+  p.links = 10;
+  p.threshold = 0.005f;
+  p.relight_rays = 8000;
+  return p;
+}
 
 /// Names a chunk. Size 0: absent (the object has no surface elements).
 struct ChunkRef {
@@ -53,7 +69,7 @@ using GridCell = std::array<int32_t, 3>;
 struct ProbeEntry {
   Vec3 position;
   GridCell cell{};    ///< world cell of side `spacing`
-  uint32_t slot = 0;  ///< 0: the cell's base probe; 1..8: its repair probes
+  uint32_t slot = 0;  ///< numbers the probes of a cell
   ChunkRef relight;
   bool operator==(const ProbeEntry&) const = default;
 };

@@ -4,7 +4,9 @@
 #include <cmath>
 #include <string>
 
+#include "core/base/sampling.h"
 #include "core/base/sh.h"
+#include "core/probes/sl17_placement.h"
 
 namespace lightloom {
 namespace {
@@ -89,7 +91,11 @@ absl::Status check_params(const BakeParams& p) {
   const auto bad = [](const std::string& what) { return absl::InvalidArgumentError(what); };
   if (p.order < 0 || p.order > kMaxShOrder) return bad("--order must be 0 to " + std::to_string(kMaxShOrder));
   if (!(p.spacing >= 0) || !std::isfinite(p.spacing)) return bad("--spacing must be a positive number of metres");
-  if (p.links < 1 || p.links > 32) return bad("--links must be 1 to 32");
+  if (p.probes < 0 || p.probes > 1 << 20) return bad("--probes must be 0 to 1048576");
+  if (p.probes > 0 && p.method != BakeMethod::kSl17) {
+    return bad("--probes goes with --method sl17; otherwise --spacing decides");
+  }
+  if (p.links < 1 || p.links > 64) return bad("--links must be 1 to 64");
   if (p.rays < 1 || p.rays > 65536) return bad("--rays must be 1 to 65536");
   if (p.relight_rays < 1 || p.relight_rays > 1 << 20) return bad("--relight-rays must be 1 to 1048576");
   if (p.max_rank < 0 || p.max_rank > 256) return bad("--max-rank must be 0 to 256");
@@ -109,8 +115,8 @@ absl::StatusOr<Plan> make_plan(const RayTracer& tracer, const BakeParams& reques
   plan.params = request;
 
   // Choose what the request leaves open, and record it.
-  const int side = std::max(1, static_cast<int>(std::lround(std::sqrt(static_cast<double>(request.rays)))));
-  plan.params.rays = side * side;
+  const bool sl17 = request.method == BakeMethod::kSl17;
+  plan.params.rays = static_cast<int32_t>(well_stratified(static_cast<uint32_t>(request.rays)));
   if (plan.params.spacing == 0) plan.params.spacing = default_spacing(scene.bounds());
   LL_RETURN_IF_ERROR(check_spacing(plan.params.spacing, scene.bounds()));
   LayoutOptions layout_options;
@@ -126,10 +132,13 @@ absl::StatusOr<Plan> make_plan(const RayTracer& tracer, const BakeParams& reques
         "no lightmap texel lies in open space: give the level static objects that receive a lightmap, and check that "
         "its normals do not all point into solids");
   }
-  PlacementOptions placement;
-  placement.spacing = plan.params.spacing;
-  placement.nearest = plan.params.links + kFallbacks;
-  LL_ASSIGN_OR_RETURN(plan.placement, place_probes(tracer, &plan.receivers, placement, control.stage("probes")));
+  if (sl17) {
+    const Sl17Options placement{plan.params.spacing, plan.params.probes, plan.params.links};
+    LL_ASSIGN_OR_RETURN(plan.placement, place_probes_sl17(tracer, &plan.receivers, placement, control.stage("probes")));
+  } else {
+    const PlacementOptions placement{plan.params.spacing, plan.params.links + kFallbacks};
+    LL_ASSIGN_OR_RETURN(plan.placement, place_probes(tracer, &plan.receivers, placement, control.stage("probes")));
+  }
 
   std::vector<uint32_t> all(plan.receivers.all.size());
   for (uint32_t i = 0; i < all.size(); ++i) all[i] = i;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <map>
 
 #include "core/compression/clusters.h"
@@ -54,8 +55,10 @@ CellTask make_cell_task(const Plan& plan, const Scene& scene, const PlannedCell&
   const ProbeGrid grid(probes, plan.params.spacing);
   std::vector<std::vector<ProbeGrid::Near>> near(cell.receivers.size());
   std::vector<uint32_t> reachable;
+  const bool sl17 = plan.params.method == BakeMethod::kSl17;
   for (size_t i = 0; i < cell.receivers.size(); ++i) {
-    near[i] = grid.nearest(plan.receivers.all[cell.receivers[i]].point.position, plan.params.links + kFallbacks);
+    const Vec3 x = plan.receivers.all[cell.receivers[i]].point.position;
+    near[i] = sl17 ? grid.within(x, plan.placement.radius) : grid.nearest(x, plan.params.links + kFallbacks);
     for (const auto& n : near[i]) reachable.push_back(n.probe);
   }
   const auto probe_slot = enumerate(std::move(reachable));
@@ -70,15 +73,19 @@ CellTask make_cell_task(const Plan& plan, const Scene& scene, const PlannedCell&
     point.point = r.point;
     point.seed = hash_combine(r.seed, plan.params.seed);
     for (const auto& n : near[i]) point.near.push_back(probe_slot.at(n.probe));
+    // SL17: one radius for all. Else the k nearest, and the distance to the next one: local, and continuous in x.
+    const size_t k = static_cast<size_t>(plan.params.links);
+    point.links = static_cast<uint32_t>(sl17 ? near[i].size() : std::min(near[i].size(), k));
+    point.radius = sl17 ? plan.placement.radius : near[i].size() > k ? std::sqrt(near[i][k].distance2) : 0.0f;
     task.receivers.push_back(std::move(point));
     task.texels.push_back({slot_of.at(r.object), r.key});
   }
   return task;
 }
 
-CellResult bake_cell(const RayTracer& tracer, const CellTask& task) {
+CellResult bake_cell(const RayTracer& tracer, VisibilityCache* cache, const CellTask& task) {
   const int J = sh_count(task.params.order);
-  const GatherOptions gather{task.params.order, task.params.links, task.params.rays};
+  const bool sl17 = task.params.method == BakeMethod::kSl17;
   CellResult out;
 
   // Transport: one row α_x per receiver.
@@ -86,10 +93,11 @@ CellResult bake_cell(const RayTracer& tracer, const CellTask& task) {
   Matrix transport =
       Matrix::Zero(static_cast<Eigen::Index>(task.receivers.size()), static_cast<Eigen::Index>(task.probes.size()) * J);
   std::vector<Vec3> positions;
+  Gatherer gatherer(tracer, cache, {task.probes, task.probe_ids}, {task.params.order, task.params.rays, !sl17});
   for (size_t r = 0; r < task.receivers.size(); ++r) {
     const std::span<float> row(transport.row(static_cast<Eigen::Index>(r)).data(),
                                static_cast<size_t>(transport.cols()));
-    out.stats += gather_row(tracer, task.receivers[r], task.probes, gather, row);
+    out.stats += gatherer.add_row(task.receivers[r], row);
     positions.push_back(task.receivers[r].point.position);
     out.bounds.extend(positions.back());
   }
@@ -101,6 +109,7 @@ CellResult bake_cell(const RayTracer& tracer, const CellTask& task) {
   options.order = task.params.order;
   options.max_rank = task.params.max_rank;
   options.threshold = task.params.threshold;
+  options.weigh_bands = !sl17;
   options.relight_rays = static_cast<uint32_t>(task.params.relight_rays);
   options.seed = task.seed;
   CompressedCell compressed = compress_cell(transport, positions, options);

@@ -33,7 +33,9 @@ struct CellResult {
 };
 
 CellTask make_cell_task(const Plan& plan, const Scene& scene, const PlannedCell& cell);
-CellResult bake_cell(const RayTracer& tracer, const CellTask& task);
+/// `cache` remembers what the plan's probes see, between cells; the result does not depend on what is in it. Null (as
+/// SL17 is published): a ray is traced for every hit and probe.
+CellResult bake_cell(const RayTracer& tracer, VisibilityCache* cache, const CellTask& task);
 
 /// What the probe sees along its relight rays, as texels of the plan's receivers.
 RelightChunk bake_relight(const RayTracer& tracer, const Plan& plan, const ReceiverSearch& receivers, Vec3 probe);

@@ -35,17 +35,32 @@ inline Vec3 to_world(Vec3 d, Vec3 n) {
   return s * d.x + t * d.y + n * d.z;
 }
 
-/// Sample i of a side×side stratified set over the unit square, jittered by `rng`.
+struct Strata {
+  uint32_t columns = 1, rows = 1;
+};
+/// n strata, as near to a square as n's divisors allow, columns ≤ rows.
+inline Strata strata_of(uint32_t n) {
+  uint32_t columns = static_cast<uint32_t>(std::sqrt(static_cast<double>(n)));
+  while (n % columns != 0) --columns;
+  return {columns, n / columns};
+}
+/// The least number from n on whose strata are at most twice as long as wide.
+inline uint32_t well_stratified(uint32_t n) {
+  while (strata_of(n).rows > 2 * strata_of(n).columns) ++n;
+  return n;
+}
+
+/// Sample i of a stratified set over the unit square, jittered by `rng`.
 struct Sample2 {
   float u, v;
 };
-inline Sample2 stratified(uint32_t i, uint32_t side, Rng* rng) {
-  const float inverse = 1.0f / static_cast<float>(side);
+inline Sample2 stratified(uint32_t i, Strata strata, Rng* rng) {
   const float below_one = 0x1.fffffep-1f;
-  const float u = (static_cast<float>(i % side) + rng->next_float()) * inverse;
-  const float v = (static_cast<float>(i / side) + rng->next_float()) * inverse;
+  const float u = (static_cast<float>(i % strata.columns) + rng->next_float()) / static_cast<float>(strata.columns);
+  const float v = (static_cast<float>(i / strata.columns) + rng->next_float()) / static_cast<float>(strata.rows);
   return {std::min(u, below_one), std::min(v, below_one)};
 }
+inline Sample2 stratified(uint32_t i, uint32_t side, Rng* rng) { return stratified(i, Strata{side, side}, rng); }
 
 /// Side of the largest square of strata that n samples fill; the rest is left out.
 inline uint32_t strata(int n) { return std::max(1u, static_cast<uint32_t>(std::sqrt(static_cast<float>(n)))); }

@@ -35,13 +35,13 @@ Block extract(const Matrix& transport, std::span<const uint32_t> rows, Eigen::In
 }
 
 /// W: the expected size of a radiance coefficient of band l, relative to band 0.
-Eigen::RowVectorXf band_weights(int order, size_t probes) {
-  const int J = sh_count(order);
+Eigen::RowVectorXf band_weights(const CompressionOptions& o, size_t probes) {
+  const int order = o.order, J = sh_count(order);
   Eigen::RowVectorXf w(static_cast<Eigen::Index>(probes) * J);
   for (size_t p = 0; p < probes; ++p) {
     for (int l = 0; l <= order; ++l) {
       for (int j = l * l; j < (l + 1) * (l + 1); ++j) {
-        w(static_cast<Eigen::Index>(p) * J + j) = 1.0f / static_cast<float>(1 + l);
+        w(static_cast<Eigen::Index>(p) * J + j) = o.weigh_bands ? 1.0f / static_cast<float>(1 + l) : 1.0f;
       }
     }
   }
@@ -75,7 +75,7 @@ Truncated truncate(const Matrix& transport, std::span<const uint32_t> rows, cons
   for (Eigen::Index p = 0; p < probes; ++p) {
     rest.col(p * J) -= out.uniform * (kShUniform / (4 * kPi * static_cast<float>(probes)));
   }
-  out.weights = band_weights(o.order, out.block.probes.size());
+  out.weights = band_weights(o, out.block.probes.size());
   out.norm2 = (out.block.t.array().rowwise() * out.weights.array()).matrix().squaredNorm();
   rest.array().rowwise() *= out.weights.array();
   out.svd = truncated_svd(rest, o.max_rank, seed);

@@ -17,6 +17,7 @@ struct CompressionOptions {
   int max_rank = 32;
   float threshold = 0.02f;       ///< relative Frobenius error at which the rank ends
   uint32_t min_receivers = 128;  ///< > 0: a cluster is not split below this many receivers
+  bool weigh_bands = true;       ///< measure errors on T·W
   uint32_t relight_rays = 0;     ///< of the probes: the uniform field that is kept is sh_uniform(order, relight_rays)
   uint64_t seed = 0;
 };
@@ -31,7 +32,7 @@ struct CompressedCell {
 /// T: receivers × (probes·J), E = T·λ. A cluster whose error stays above the threshold at max_rank is split at the median
 /// of its longest axis while both halves keep min_receivers.
 ///
-/// Errors are measured on T·W, W falling with the band l of a column as 1/(1+l): a level's light has far less energy in
+/// Errors may be measured on T·W, W falling with the band l of a column as 1/(1+l): a level's light has far less energy in
 /// high bands, and so does what truncation there costs.
 CompressedCell compress_cell(const Matrix& transport, std::span<const Vec3> positions,
                              const CompressionOptions& options);

@@ -45,4 +45,14 @@ std::vector<ProbeGrid::Near> ProbeGrid::nearest(Vec3 p, int count) const {
   return found;
 }
 
+std::vector<ProbeGrid::Near> ProbeGrid::within(Vec3 p, float radius) const {
+  std::vector<Near> found;
+  for (uint32_t i = 0; i < probes_.size(); ++i) {
+    const Vec3 d = probes_[i].position - p;
+    if (radius == 0 || dot(d, d) <= radius * radius) found.push_back({dot(d, d), i});
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
 }  // namespace lightloom

@@ -18,7 +18,7 @@ namespace lightloom {
 struct Probe {
   Vec3 position;
   std::array<int32_t, 3> cell{};  ///< world cell of side `spacing`
-  uint32_t slot = 0;              ///< 0: base probe; 1 + octant: repair
+  uint32_t slot = 0;              ///< 0: base probe; 1 + octant: repair. SL17: a number
   auto key() const { return std::pair(cell, slot); }
 };
 
@@ -31,6 +31,7 @@ struct PlacementResult {
   std::vector<Probe> probes;  ///< sorted by key
   double unseen = 0;   ///< share of test rays whose hit, or sky, no base probe in reach sees: what repair starts from
   size_t repairs = 0;  ///< probes added by repair
+  float radius = 0;    ///< of every probe's support (SL17), metres; 0: receivers read their nearest probes
 };
 /// Base probes are placed for the front sides; back sides that none of them in reach sees are then dropped from
 /// `receivers`: they lie in cavities that no light of the level's open space enters and no camera looks into.

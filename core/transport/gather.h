@@ -2,8 +2,8 @@
 // nearby probes that see it.
 //
 // Silvennoinen & Lehtinen, "Real-time Global Illumination by Precomputed Local Reconstruction from Sparse Radiance
-// Probes", TOG 36(6), 2017, Eqs. 2, 4, 7. Different from the paper (ADR 0002): links are the k nearest probes with the
-// distance to the next one as support radius, and weights also follow how finely a probe resolves what was hit.
+// Probes", TOG 36(6), 2017, Eqs. 2, 4, 7. What may differ from the paper (ADR 0002) is in the options and in which
+// probes a receiver is given.
 #pragma once
 
 #include <cstdint>
@@ -13,20 +13,25 @@
 #include "core/base/vec.h"
 #include "core/receivers/surface_point.h"
 #include "core/scene/ray_tracer.h"
+#include "core/transport/sh_accumulator.h"
+#include "core/transport/visibility_cache.h"
 
 namespace lightloom {
 
 struct GatherOptions {
   int order = 7;   ///< n, SH order of the probes
-  int links = 6;   ///< k
-  int rays = 256;  ///< per receiver, a square number
+  int rays = 256;  ///< per receiver
+  /// Weigh probes also by how finely they resolve what was hit: the solid angle of a unit of its area.
+  bool weigh_by_resolution = true;
 };
 
-/// A receiver and the probes it may read, nearest first: the k links, the one that sets their support, then fallbacks.
+/// A receiver and the probes it may read, nearest first.
 struct GatherPoint {
   ShadingPoint point;
   uint64_t seed = 0;
-  std::vector<uint32_t> near;  ///< indices into the cell's probes
+  std::vector<uint32_t> near;  ///< indices into the cell's probes: links, then fallbacks for what no link sees
+  uint32_t links = 0;          ///< how many of `near` are blended
+  float radius = 0;            ///< r of w(|x − p|/r), metres; 0: all links weigh alike
 };
 
 /// Counts over many receivers.
@@ -37,9 +42,51 @@ struct GatherStats {
   GatherStats& operator+=(const GatherStats& o);
 };
 
-/// α_x for one receiver, added to `row`: row[i·J + j] for probe i of the cell, J = sh_count(order). E = α·λ.
-/// REQUIRES: row.size() = probes.size()·J, zero.
-GatherStats gather_row(const RayTracer& tracer, const GatherPoint& receiver, std::span<const Vec3> probes,
-                       const GatherOptions& options, std::span<float> row);
+/// A cell's probes.
+struct GatherProbes {
+  std::span<const Vec3> positions;
+  std::span<const uint32_t> ids;  ///< what a VisibilityCache calls them
+};
+
+/// Works on one receiver after the other, with the memory of the last one.
+class Gatherer {
+ public:
+  /// `cache` may be null: then a ray is traced for every hit and probe. Keeps references to the arguments.
+  Gatherer(const RayTracer& tracer, VisibilityCache* cache, GatherProbes probes, const GatherOptions& options);
+
+  /// α_x, added to `row`: row[i·J + j] for probe i of the cell, J = sh_count(order). E = α·λ.
+  /// REQUIRES: row.size() = probes·J.
+  GatherStats add_row(const GatherPoint& receiver, std::span<float> row);
+
+ private:
+  /// What a gather ray found.
+  struct Sample {
+    enum Kind : uint8_t { kSurface, kSky, kDead } kind = kDead;
+    VisibilityCache::Patch patch = VisibilityCache::kNoPatch;
+    Vec3 position;  ///< of the hit, pushed off, for kSurface
+    Vec3 normal;
+    Vec3 direction;  ///< of the ray
+  };
+  /// That a probe, by its place in `near`, sees the sample, and where.
+  struct Sight {
+    uint32_t sample = 0;
+    float weight = 0;  ///< w_i·V_i, to be divided by their sum
+    Vec3 psi;          ///< ψ_i(ω), unit
+  };
+
+  Sample shoot(const ShadingPoint& from, Vec3 direction);
+  bool sees(uint32_t probe, const Sample& sample, Vec3* psi);
+
+  const RayTracer& tracer_;
+  VisibilityCache* cache_;
+  GatherProbes probes_;
+  GatherOptions options_;
+  GatherStats stats_;
+  ShAccumulator accumulator_;
+  std::vector<Sample> samples_;
+  std::vector<float> spatial_;              // w_i(x), per link
+  std::vector<float> sum_;                  // Σ_k w_k·V_k, per sample
+  std::vector<std::vector<Sight>> sights_;  // per place in `near`
+};
 
 }  // namespace lightloom

@@ -1,0 +1,114 @@
+#include "core/probes/sl17_placement.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <string>
+
+#include "core/probes/density_thinning.h"
+#include "core/probes/links.h"
+#include "core/probes/voxels.h"
+
+namespace lightloom {
+namespace {
+
+constexpr float kVoxelsPerSpacing = 8;
+
+/// Points of a regular grid over the level.
+size_t grid_points(const Aabb& bounds, float spacing) {
+  double count = 1;
+  for (int a = 0; a < 3; ++a) count *= std::floor((static_cast<double>(bounds.hi[a]) - bounds.lo[a]) / spacing) + 1;
+  return static_cast<size_t>(count);
+}
+
+/// Floods from the first empty voxel in front of each front-side receiver.
+void flood_open_space(const RayTracer& tracer, const Receivers& receivers, float side, Voxels* voxels) {
+  for (const Receiver& r : receivers.all) {
+    if (r.back) continue;
+    for (int step = 1; step <= 4; ++step) {
+      const Vec3 p = r.point.position + r.point.geometric * (0.5f * side * static_cast<float>(step));
+      if (!voxels->empty(p)) continue;
+      if (tracer.visible(r.point.position, p)) voxels->flood(p);
+      break;
+    }
+  }
+}
+
+/// With the cells of a world grid, and numbers within each, as names.
+std::vector<Probe> name_probes(const std::vector<Vec3>& points, float spacing) {
+  std::map<std::array<int32_t, 3>, uint32_t> in_cell;
+  std::vector<Probe> out;
+  for (const Vec3 p : points) {
+    std::array<int32_t, 3> cell;
+    for (size_t a = 0; a < 3; ++a) {
+      cell[a] = static_cast<int32_t>(std::floor(static_cast<double>(p[static_cast<int>(a)]) / spacing));
+    }
+    out.push_back({p, cell, in_cell[cell]++});
+  }
+  std::sort(out.begin(), out.end(), [](const Probe& a, const Probe& b) { return a.key() < b.key(); });
+  return out;
+}
+
+}  // namespace
+
+absl::StatusOr<PlacementResult> place_probes_sl17(const RayTracer& tracer, Receivers* receivers,
+                                                  const Sl17Options& options, const Parallel& parallel) {
+  const Aabb bounds = tracer.scene().bounds();
+  const float side = options.spacing / kVoxelsPerSpacing;
+  if (const double count = Voxels::count_for(bounds, side); count > Voxels::kMost) {
+    return absl::InvalidArgumentError(
+        "--method sl17 would need " + std::to_string(static_cast<uint64_t>(count)) +
+        " voxels for this level, more than 2^26: give a --spacing of at least " +
+        std::to_string(options.spacing * static_cast<float>(std::cbrt(count / Voxels::kMost)) * 1.05f));
+  }
+  Voxels voxels(tracer.scene(), side);
+  flood_open_space(tracer, *receivers, side, &voxels);
+  const std::vector<Vec3> candidates = voxels.connected_near_surfaces();
+  if (candidates.empty()) {
+    return absl::InvalidArgumentError(
+        "--method sl17 found no empty voxel next to a surface: give a smaller --spacing than " +
+        std::to_string(options.spacing));
+  }
+  const size_t target = options.count > 0 ? static_cast<size_t>(options.count) : grid_points(bounds, options.spacing);
+  PlacementResult result;
+  result.probes = name_probes(thin_by_density(candidates, options.spacing, target), options.spacing);
+  result.radius = support_radius(result.probes, *receivers, options.overlap);
+
+  std::vector<uint8_t> seen(receivers->all.size(), 1);
+  const ProbeGrid grid(result.probes, options.spacing);
+  const bool done = parallel_for(receivers->all.size(), parallel, [&](uint64_t i) {
+    const Receiver& r = receivers->all[i];
+    if (!r.back) return;
+    const auto near = grid.within(r.point.position, result.radius);
+    seen[i] = std::any_of(near.begin(), near.end(), [&](const ProbeGrid::Near& n) {
+      return tracer.visible(r.point.position, result.probes[n.probe].position);
+    });
+  });
+  if (!done) return absl::CancelledError("cancelled while placing probes");
+  receivers->retain(std::vector<bool>(seen.begin(), seen.end()));
+  return result;
+}
+
+float support_radius(std::span<const Probe> probes, const Receivers& receivers, int overlap) {
+  if (probes.size() <= static_cast<size_t>(overlap)) return 0;
+  Aabb box;
+  for (const Probe& p : probes) box.extend(p.position);
+  for (const Receiver& r : receivers.all) box.extend(r.point.position);
+  const float longest = length(box.size());
+  // The distance that overlap · receivers of all distances do not exceed.
+  constexpr size_t kBins = 65536;
+  std::vector<uint64_t> bins(kBins + 1, 0);
+  for (const Receiver& r : receivers.all) {
+    for (const Probe& p : probes) {
+      const float share = length(r.point.position - p.position) / longest;
+      ++bins[static_cast<size_t>(share * static_cast<float>(kBins))];
+    }
+  }
+  const uint64_t wanted = static_cast<uint64_t>(overlap) * receivers.all.size();
+  uint64_t count = 0;
+  size_t bin = 0;
+  while (bin <= kBins && count < wanted) count += bins[bin++];
+  return longest * static_cast<float>(bin) / static_cast<float>(kBins);
+}
+
+}  // namespace lightloom
