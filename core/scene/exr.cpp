@@ -4,10 +4,14 @@
 #include <OpenEXR/ImfInputFile.h>
 #include <OpenEXR/ImfOutputFile.h>
 
+#include <algorithm>
 #include <exception>
+#include <fstream>
+#include <string>
 #include <system_error>
 
 #include "core/base/file.h"
+#include "core/scene/exr_header.h"
 #include "core/scene/image.h"
 
 namespace lightloom {
@@ -16,6 +20,17 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int64_t kMaxValues = int64_t{1} << 28;
+
+absl::Status check_header(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::error_code code;
+  const uint64_t bytes = fs::file_size(path, code);
+  if (code || !file) return absl::InvalidArgumentError("it cannot be opened");
+  std::vector<uint8_t> head(std::min(bytes, kMaxExrHeader));
+  file.read(reinterpret_cast<char*>(head.data()), static_cast<std::streamsize>(head.size()));
+  if (!file) return absl::InvalidArgumentError("it cannot be read");
+  return check_exr_header(head, bytes);
+}
 
 absl::Status cannot_write(const fs::path& path, const std::string& why) {
   return absl::InvalidArgumentError("cannot write " + path.string() + ": " + why);
@@ -60,6 +75,7 @@ absl::StatusOr<Image> read_exr(const fs::path& path) {
   std::error_code code;
   if (!fs::exists(path, code)) return absl::NotFoundError("cannot open " + path.string() + ": no such file");
   if (!fs::is_regular_file(path, code)) return broken("it is not a regular file");
+  if (const absl::Status header = check_header(path); !header.ok()) return broken(std::string(header.message()));
   try {
     Imf::InputFile file(path.c_str());
     const Imath::Box2i window = file.header().dataWindow();

@@ -56,7 +56,7 @@ int make_seeds(const fs::path& folder) {
   must(save_gltf(test::room_with_crate(), folder / "gltf" / "crate.glb"));
   must(save_gltf(*builtin_scene("cornell"), folder / "gltf" / "cornell.glb"));
   must(write_file_atomic(folder / "rig" / "all.json", std::string_view(kRigs)));
-  Image image(5, 3);
+  Image image(5, 3, {"R", "G", "B"});
   for (int i = 0; i < 15; ++i) image.set_rgb(i % 5, i / 5, {0.1f * static_cast<float>(i), 1, 2});
   must(write_exr(image, folder / "exr" / "small.exr"));
   put_loom(folder / "loom" / "manifest", 0, encode_manifest(testing::sample_manifest()));

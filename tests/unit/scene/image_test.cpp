@@ -71,6 +71,16 @@ TEST(Exr, RefusesWhatItCannotRead) {
   bytes->resize(bytes->size() / 2);
   ASSERT_TRUE(write_file_atomic(folder / "half.exr", *bytes).ok());
   EXPECT_FALSE(read_exr(folder / "half.exr").ok());
+
+  // The first attribute claims 2 GiB: refused before anybody makes room for that.
+  bytes = read_file(folder / "a.exr");
+  ASSERT_TRUE(bytes.ok());
+  const std::string_view channels("channels\0chlist\0", 16);
+  const auto at = std::search(bytes->begin(), bytes->end(), channels.begin(), channels.end()) + 16;
+  ASSERT_LT(at, bytes->end() - 4);
+  at[3] = 0x7f;
+  ASSERT_TRUE(write_file_atomic(folder / "vast.exr", *bytes).ok());
+  EXPECT_THAT(std::string(read_exr(folder / "vast.exr").status().message()), HasSubstr("header ends too early"));
   EXPECT_FALSE(write_exr(Image(), folder / "empty.exr").ok());
 }
 
