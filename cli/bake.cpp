@@ -1,4 +1,6 @@
 // lightloom bake: a level becomes a .loom asset.
+#include <sys/resource.h>
+
 #include <nlohmann/json.hpp>
 
 #include <cstdio>
@@ -25,6 +27,13 @@ struct Options {
   bool json = false;
 };
 
+/// Of this process, bytes.
+uint64_t peak_memory() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return 1024 * static_cast<uint64_t>(usage.ru_maxrss);
+}
+
 nlohmann::json to_json(const BakeReport& r) {
   return {
       {"receivers", r.receivers},
@@ -36,18 +45,23 @@ nlohmann::json to_json(const BakeReport& r) {
       {"coefficients_per_receiver", r.coefficients},
       {"rays_gather", r.rays_gather},
       {"rays_visibility", r.rays_visibility},
+      {"rays_relight", r.rays_relight},
       {"unseen_fraction", r.rays_gather > 0 ? static_cast<double>(r.unseen) / static_cast<double>(r.rays_gather) : 0.0},
       {"seconds",
        {{"total", r.seconds_total},
         {"plan", r.seconds_plan},
+        {"receivers", r.seconds_receivers},
+        {"probes", r.seconds_probes},
         {"transport", r.seconds_transport},
         {"compress", r.seconds_compress},
+        {"relight", r.seconds_relight},
         {"write", r.seconds_write}}},
       {"bytes",
        {{"total", r.bytes_total},
         {"projection", r.bytes_projection},
         {"reconstruction", r.bytes_reconstruction},
-        {"relight", r.bytes_relight}}}};
+        {"relight", r.bytes_relight},
+        {"peak_memory", peak_memory()}}}};
 }
 
 void print(const std::string& output, const BakeReport& r) {

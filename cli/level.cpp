@@ -5,6 +5,7 @@
 #include "cli/files.h"
 #include "cli/interrupt.h"
 #include "core/base/text.h"
+#include "core/scene/defects.h"
 #include "core/scene/gltf.h"
 #include "core/scene/picture.h"
 #include "core/scene/rig.h"
@@ -51,8 +52,12 @@ absl::Status check_level(const std::string& path, const std::string& lights, con
 absl::StatusOr<Level> load_level(const std::string& path, const std::string& lights, const std::string& rig,
                                  const std::function<absl::Status(Scene*)>& edit) {
   LL_ASSIGN_OR_RETURN(Scene scene, load_gltf(path));
-  for (const std::string& warning : scene.warnings)
-    std::fprintf(stderr, "warning: %s\n", escape_controls(warning).c_str());
+  std::string warning;
+  for (const std::string& line : scene.warnings) warning += (warning.empty() ? "" : "; ") + line;
+  if (const std::string defects = describe(find_defects(scene)); !defects.empty()) {
+    warning += (warning.empty() ? "" : "; ") + defects;
+  }
+  if (!warning.empty()) std::fprintf(stderr, "warning: %s: %s\n", path.c_str(), escape_controls(warning).c_str());
   LL_RETURN_IF_ERROR(not_interrupted());
   if (!lights.empty()) {
     LL_ASSIGN_OR_RETURN(const Rig chosen, choose_rig(lights, rig));

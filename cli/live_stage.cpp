@@ -3,11 +3,11 @@
 #include <lightloom_vulkan.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstring>
 
 #include "cli/interrupt.h"
 #include "cli/loom_runtime.h"
+#include "core/base/stopwatch.h"
 #include "core/relight/lightmap.h"
 #include "runtime/renderer/renderer.h"
 
@@ -27,7 +27,7 @@ class LiveStage : public Stage {
   absl::Status light() override {
     if (!renderer_) LL_RETURN_IF_ERROR(start());
     LL_RETURN_IF_ERROR(renderer_->update_lights());
-    const auto begin = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     // The last frame is recorded together with the next picture.
     waiting_ = options_.bounces > 0;
     for (int i = 1; i < options_.bounces; ++i) {
@@ -37,7 +37,7 @@ class LiveStage : public Stage {
         return record(commands);
       }));
     }
-    seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    seconds_ += watch.seconds();
     return absl::OkStatus();
   }
 

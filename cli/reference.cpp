@@ -1,7 +1,6 @@
 // lightloom reference: path-traced truth for the texels or a camera.
 #include <nlohmann/json.hpp>
 
-#include <chrono>
 #include <cstdio>
 #include <memory>
 
@@ -11,6 +10,7 @@
 #include "cli/level.h"
 #include "cli/print_json.h"
 #include "cli/progress.h"
+#include "core/base/stopwatch.h"
 #include "core/base/text.h"
 #include "core/reference/path_tracer.h"
 
@@ -51,7 +51,7 @@ absl::Status run(const Options& o) {
   options.footprint = o.footprint == "cycles" ? Footprint::kCycles : Footprint::kTexel;
   options.parallel = bar.parallel("tracing", o.threads);
 
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   absl::StatusOr<ReferenceResult> result;
   if (o.camera.empty()) {
     LayoutOptions layout_options;
@@ -70,7 +70,7 @@ absl::Status run(const Options& o) {
     result = reference_camera(*level.tracer, camera, o.width, options);
   }
   LL_RETURN_IF_ERROR(result.status());
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const double seconds = watch.seconds();
   bar.finish();
   LL_RETURN_IF_ERROR(write_exr(result->image, o.output));
   if (o.json) {

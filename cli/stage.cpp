@@ -1,10 +1,10 @@
 #include "cli/stage.h"
 
-#include <chrono>
 
 #include "cli/interrupt.h"
 #include "cli/live_stage.h"
 #include "core/asset/asset.h"
+#include "core/base/stopwatch.h"
 #include "core/relight/camera_view.h"
 #include "core/relight/lightmap.h"
 #include "runtime/renderer/renderer.h"
@@ -22,11 +22,11 @@ class PlayedStage : public Stage {
                                                                    bar_->parallel("direct light", options_.threads)));
     bar_->finish();
     LL_RETURN_IF_ERROR(not_interrupted());
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     PlayTimes times;
     const PlayOptions play_options{options_.bounces, options_.player, options_.validation, options_.threads};
     LL_ASSIGN_OR_RETURN(e_, play(options_.loom, inputs, level_.scene->environment, play_options, &times));
-    seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    seconds_ += watch.seconds();
     times_.radiosity += times.radiosity;
     times_.relight += times.relight;
     times_.project += times.project;

@@ -1,15 +1,12 @@
 #include "core/bake/bake.h"
 
 #include <atomic>
-#include <chrono>
 #include <mutex>
+
+#include "core/base/stopwatch.h"
 
 namespace lightloom {
 namespace {
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 /// Writes chunks from several threads and keeps the first error.
 class ChunkWriter {
@@ -17,10 +14,10 @@ class ChunkWriter {
   explicit ChunkWriter(ChunkStore store) : store_(std::move(store)) {}
 
   ChunkRef put(std::span<const uint8_t> bytes) {
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     auto ref = store_.put(bytes);
     const std::lock_guard lock(mutex_);
-    seconds_ += seconds_since(start);
+    seconds_ += watch.seconds();
     if (!ref.ok()) {
       if (status_.ok()) status_ = ref.status();
       failed_ = true;
@@ -65,17 +62,19 @@ void add_cell(const CellResult& c, BakeReport* report) {
 
 absl::StatusOr<BakeReport> bake(const RayTracer& tracer, const BakeParams& params, const std::filesystem::path& loom,
                                 const BakeControl& control) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   const Scene& scene = tracer.scene();
   BakeReport report;
   LL_ASSIGN_OR_RETURN(const Plan plan, make_plan(tracer, params, control));
-  report.seconds_plan = seconds_since(start);
+  report.seconds_plan = watch.seconds();
+  report.seconds_receivers = plan.seconds_receivers;
+  report.seconds_probes = plan.seconds_probes;
   report.receivers = plan.receivers.all.size();
   report.repairs = plan.placement.repairs;
   report.cells = plan.cells.size();
 
   ChunkWriter writer(chunk_store(loom));
-  const auto cells_start = std::chrono::steady_clock::now();
+  const Stopwatch cells_watch;
   std::vector<CellResult> cells(plan.cells.size());
   std::vector<ChunkRef> cell_refs(plan.cells.size());
   std::atomic<uint64_t> rays{0};
@@ -104,7 +103,7 @@ absl::StatusOr<BakeReport> bake(const RayTracer& tracer, const BakeParams& param
     compress += c.compress_seconds;
   }
   // The threads' shares of the stage's wall time.
-  const double cells_seconds = seconds_since(cells_start);
+  const double cells_seconds = cells_watch.seconds();
   if (transport + compress > 0) {
     report.seconds_transport = cells_seconds * transport / (transport + compress);
     report.seconds_compress = cells_seconds - report.seconds_transport;
@@ -112,6 +111,7 @@ absl::StatusOr<BakeReport> bake(const RayTracer& tracer, const BakeParams& param
 
   const std::vector<uint32_t> used = used_probes(cells);
   report.probes = used.size();
+  const Stopwatch relight_watch;
   std::vector<ChunkRef> relight(used.size());
   const ReceiverSearch search(scene, plan.layout, plan.receivers);
   done = parallel_for(used.size(), control.stage("relight rays"), [&](uint64_t i) {
@@ -121,6 +121,8 @@ absl::StatusOr<BakeReport> bake(const RayTracer& tracer, const BakeParams& param
   });
   LL_RETURN_IF_ERROR(writer.status());
   if (!done) return cancelled(loom);
+  report.seconds_relight = relight_watch.seconds();
+  report.rays_relight = used.size() * static_cast<uint64_t>(plan.params.relight_rays);
   std::vector<ChunkRef> surfaces(scene.objects.size());
   for (uint32_t o = 0; o < surfaces.size(); ++o) {
     if (writer.failed()) break;
@@ -139,7 +141,7 @@ absl::StatusOr<BakeReport> bake(const RayTracer& tracer, const BakeParams& param
   for (const ChunkRef& ref : relight) report.bytes_relight += ref.size;
   report.bytes_total += std::filesystem::file_size(loom / "manifest");
   if (report.receivers > 0) report.coefficients /= static_cast<double>(report.receivers);
-  report.seconds_total = seconds_since(start);
+  report.seconds_total = watch.seconds();
   return report;
 }
 

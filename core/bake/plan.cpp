@@ -6,6 +6,7 @@
 
 #include "core/base/sampling.h"
 #include "core/base/sh.h"
+#include "core/base/stopwatch.h"
 #include "core/probes/sl17_placement.h"
 
 namespace lightloom {
@@ -126,12 +127,15 @@ absl::StatusOr<Plan> make_plan(const RayTracer& tracer, const BakeParams& reques
   plan.params.texels_per_metre = plan.layout.texels_per_metre;
   if (plan.layout.mode == LayoutMode::kScene) plan.params.lightmap_size = plan.layout.width;
 
+  const Stopwatch receivers_watch;
   LL_ASSIGN_OR_RETURN(plan.receivers, find_receivers(tracer, plan.layout, control.stage("receivers")));
+  plan.seconds_receivers = receivers_watch.seconds();
   if (plan.receivers.all.empty()) {
     return absl::InvalidArgumentError(
         "no lightmap texel lies in open space: give the level static objects that receive a lightmap, and check that "
         "its normals do not all point into solids");
   }
+  const Stopwatch probes_watch;
   if (sl17) {
     const Sl17Options placement{plan.params.spacing, plan.params.probes, plan.params.links};
     LL_ASSIGN_OR_RETURN(plan.placement, place_probes_sl17(tracer, &plan.receivers, placement, control.stage("probes")));
@@ -139,6 +143,7 @@ absl::StatusOr<Plan> make_plan(const RayTracer& tracer, const BakeParams& reques
     const PlacementOptions placement{plan.params.spacing, plan.params.links + kFallbacks};
     LL_ASSIGN_OR_RETURN(plan.placement, place_probes(tracer, &plan.receivers, placement, control.stage("probes")));
   }
+  plan.seconds_probes = probes_watch.seconds();
 
   std::vector<uint32_t> all(plan.receivers.all.size());
   for (uint32_t i = 0; i < all.size(); ++i) all[i] = i;

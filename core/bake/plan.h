@@ -41,6 +41,7 @@ struct Plan {
   Receivers receivers;
   PlacementResult placement;
   std::vector<PlannedCell> cells;
+  double seconds_receivers = 0, seconds_probes = 0;  ///< that finding them took
 };
 
 /// Probes that a receiver may read besides its k links: the one that sets the support radius, and fallbacks.

@@ -1,10 +1,10 @@
 #include "core/bake/tasks.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <map>
 
+#include "core/base/stopwatch.h"
 #include "core/compression/clusters.h"
 #include "core/probes/links.h"
 
@@ -23,10 +23,6 @@ std::map<Id, uint32_t> enumerate(std::vector<Id> ids) {
   std::map<Id, uint32_t> slots;
   for (const Id& id : ids) slots.try_emplace(id, static_cast<uint32_t>(slots.size()));
   return slots;
-}
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 }  // namespace
@@ -89,7 +85,7 @@ CellResult bake_cell(const RayTracer& tracer, VisibilityCache* cache, const Cell
   CellResult out;
 
   // Transport: one row α_x per receiver.
-  auto start = std::chrono::steady_clock::now();
+  const Stopwatch transport_watch;
   Matrix transport =
       Matrix::Zero(static_cast<Eigen::Index>(task.receivers.size()), static_cast<Eigen::Index>(task.probes.size()) * J);
   std::vector<Vec3> positions;
@@ -101,10 +97,10 @@ CellResult bake_cell(const RayTracer& tracer, VisibilityCache* cache, const Cell
     positions.push_back(task.receivers[r].point.position);
     out.bounds.extend(positions.back());
   }
-  out.transport_seconds = seconds_since(start);
+  out.transport_seconds = transport_watch.seconds();
 
   // Compression.
-  start = std::chrono::steady_clock::now();
+  const Stopwatch compress_watch;
   CompressionOptions options;
   options.order = task.params.order;
   options.max_rank = task.params.max_rank;
@@ -130,7 +126,7 @@ CellResult bake_cell(const RayTracer& tracer, VisibilityCache* cache, const Cell
   for (const uint32_t r : compressed.order) out.chunk.receivers.push_back(task.texels[r]);
   out.chunk.uniform = std::move(compressed.uniform);
   out.chunk.clusters = std::move(compressed.clusters);
-  out.compress_seconds = seconds_since(start);
+  out.compress_seconds = compress_watch.seconds();
   return out;
 }
 
