@@ -1,6 +1,6 @@
 // What the transport of a bake costs beside its floor: a bare Embree closest-hit loop over the same gather rays.
-//   transport_bench SCENE LIGHTMAP_SIZE RAYS SPACING [sl17]
-// Prints one line of a Markdown table; judges nothing.
+//   transport_bench SCENE LIGHTMAP_SIZE RAYS SPACING [default|exact|sl17]
+// exact: as default, but a ray is traced for every hit and probe. Prints one line of a Markdown table; judges nothing.
 #include <embree3/rtcore.h>
 
 #include <atomic>
@@ -69,12 +69,13 @@ class BareEmbree {
 
 int run(int argc, char** argv) {
   if (argc < 5) {
-    std::fprintf(stderr, "usage: transport_bench SCENE LIGHTMAP_SIZE RAYS SPACING [sl17]\n");
+    std::fprintf(stderr, "usage: transport_bench SCENE LIGHTMAP_SIZE RAYS SPACING [default|exact|sl17]\n");
     return 2;
   }
   const Scene scene = or_exit(load_gltf(argv[1]));
   const auto tracer = or_exit(RayTracer::create(scene));
-  const bool sl17 = argc > 5 && std::string(argv[5]) == "sl17";
+  const std::string method = argc > 5 ? argv[5] : "default";
+  const bool sl17 = method == "sl17", cached = method == "default";
   BakeParams params = sl17 ? sl17_params() : BakeParams{};
   params.lightmap_size = std::atoi(argv[2]);
   params.rays = std::atoi(argv[3]);
@@ -109,7 +110,7 @@ int run(int argc, char** argv) {
   const Stopwatch watch;
   parallel_for(plan.cells.size(), {}, [&](uint64_t i) {
     const CellTask task = make_cell_task(plan, scene, plan.cells[i]);
-    Gatherer gatherer(*tracer, sl17 ? nullptr : &cache, {task.probes, task.probe_ids},
+    Gatherer gatherer(*tracer, cached ? &cache : nullptr, {task.probes, task.probe_ids},
                       {params.order, plan.params.rays, !sl17});
     std::vector<float> row(task.probes.size() * static_cast<size_t>(sh_count(params.order)));
     for (const GatherPoint& receiver : task.receivers) {
@@ -122,7 +123,7 @@ int run(int argc, char** argv) {
   GatherStats all;
   for (const GatherStats& s : stats) all += s;
   const double floor = 0.5 * (before + after);
-  std::printf("| %s | %zu | %zu | %.1f | %.1f | %.1f (%.1f, %.1f) | %.1f | %.2f | %.0f |\n", sl17 ? "sl17" : "default",
+  std::printf("| %s | %zu | %zu | %.1f | %.1f | %.1f (%.1f, %.1f) | %.1f | %.2f | %.0f |\n", method.c_str(),
               plan.receivers.all.size(), plan.placement.probes.size(), 1e-6 * static_cast<double>(all.gather_rays),
               1e-6 * static_cast<double>(all.visibility_rays), floor, before, after, transport, transport / floor,
               1e-6 * static_cast<double>(cache.bytes()));
