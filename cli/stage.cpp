@@ -1,6 +1,5 @@
 #include "cli/stage.h"
 
-
 #include "cli/interrupt.h"
 #include "cli/live_stage.h"
 #include "core/asset/asset.h"

@@ -14,7 +14,7 @@ struct BakeReport {
   uint64_t rays_gather = 0, rays_visibility = 0, rays_relight = 0, unseen = 0;
   double coefficients = 0;  ///< mean rank per receiver
   double seconds_total = 0, seconds_plan = 0;
-  double seconds_receivers = 0, seconds_probes = 0;     ///< parts of the plan
+  double seconds_receivers = 0, seconds_probes = 0;    ///< parts of the plan
   double seconds_transport = 0, seconds_compress = 0;  ///< wall time of the cell stage, split by its threads' time
   double seconds_relight = 0, seconds_write = 0;
   uint64_t clusters_reused = 0;  ///< taken from an earlier bake; this one bakes every cluster anew

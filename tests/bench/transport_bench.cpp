@@ -8,8 +8,8 @@
 #include <cstdlib>
 #include <string>
 
-#include "core/base/stopwatch.h"
 #include "core/bake/tasks.h"
+#include "core/base/stopwatch.h"
 #include "core/scene/gltf.h"
 
 namespace lightloom {
@@ -134,7 +134,9 @@ int run(int argc, char** argv) {
 }  // namespace lightloom
 
 int main(int argc, char** argv) {
-  std::printf("| method | receivers | probes | gather Mrays | visibility Mrays | bare loop s (before, after) | transport s | ratio | cache MB |\n");
+  std::printf(
+      "| method | receivers | probes | gather Mrays | visibility Mrays | bare loop s (before, after) | transport s | "
+      "ratio | cache MB |\n");
   std::printf("|---|---|---|---|---|---|---|---|---|\n");
   return lightloom::run(argc, argv);
 }

@@ -329,13 +329,14 @@ TEST_F(CommandLine, WhatIsWrongWithALevelIsOneWarning) {
   const Result r = run({"bake", path("twice.glb"), "-o", path("twice.loom"), "--texels-per-metre", "1", "--rays", "4",
                         "--relight-rays", "16"});
   EXPECT_EQ(r.code, 0) << r.err;
-  EXPECT_THAT(r.err, HasSubstr("warning: " + path("twice.glb") + ": " + std::to_string(twice) + " duplicate triangles"));
+  EXPECT_THAT(r.err,
+              HasSubstr("warning: " + path("twice.glb") + ": " + std::to_string(twice) + " duplicate triangles"));
   EXPECT_EQ(std::count(r.err.begin(), r.err.end(), '\n'), 1) << r.err;
 }
 
 TEST_F(CommandLine, BakesBySilvennoinenAndLehtinen) {
-  const Result r = run({"bake", scene_, "-o", path("a.loom"), "--method", "sl17", "--probes", "12", "--texels-per-metre",
-                        "2", "--rays", "16", "--relight-rays", "64", "--json"});
+  const Result r = run({"bake", scene_, "-o", path("a.loom"), "--method", "sl17", "--probes", "12",
+                        "--texels-per-metre", "2", "--rays", "16", "--relight-rays", "64", "--json"});
   EXPECT_EQ(r.code, 0) << r.err;
   EXPECT_THAT(r.out, HasSubstr("\"probes\":12"));
   fails(2, {"bake", scene_, "-o", path("b.loom"), "--method", "best"}, "--method must be default or sl17");
