@@ -1,6 +1,7 @@
 #include "core/scene/exr_header.h"
 
 #include <algorithm>
+#include <array>
 #include <map>
 #include <optional>
 #include <string>
@@ -67,16 +68,47 @@ class Cursor {
   std::span<const uint8_t> bytes_;
 };
 
-/// Names and 16 bytes each, then an empty name.
-bool is_channel_list(std::span<const uint8_t> bytes) {
+/// How many: names and 16 bytes each, then an empty name.
+std::optional<uint32_t> count_channels(std::span<const uint8_t> bytes) {
   Cursor c(bytes);
-  for (;;) {
+  for (uint32_t count = 0;; ++count) {
     const auto name = c.text();
-    if (!name) return false;
-    if (name->empty()) return c.at_end();
-    if (!c.take(16)) return false;
+    if (!name || (name->empty() && !c.at_end())) return std::nullopt;
+    if (name->empty()) return count;
+    if (!c.take(16)) return std::nullopt;
   }
 }
+
+/// What OpenEXR makes room for when it opens a file: up to 256 lines, and a tile, of all channels.
+struct Extent {
+  int64_t width = 1, height = 1, channels = 1, tile_width = 1, tile_height = 1;
+
+  /// One attribute; false if it cannot be one.
+  bool add(std::string_view name, std::string_view type, std::span<const uint8_t> value) {
+    Cursor c(value);
+    if (type == "chlist") {
+      const auto count = count_channels(value);
+      if (count) channels = std::max<int64_t>(channels, *count);
+      return count.has_value();
+    }
+    if (type == "tiledesc") {
+      tile_width = *c.u32();
+      tile_height = *c.u32();
+    } else if (name == "dataWindow" && type == "box2i") {
+      std::array<int64_t, 4> box;
+      for (int64_t& x : box) x = static_cast<int32_t>(*c.u32());
+      width = box[2] - box[0] + 1;
+      height = box[3] - box[1] + 1;
+    }
+    return true;
+  }
+  bool readable() const {
+    constexpr int64_t kMaxLine = 1 << 20, kMaxTile = 1 << 24, kMaxValues = 1 << 28;
+    return width <= kMaxLine / channels && tile_width <= kMaxTile &&
+           tile_height <= kMaxTile / channels / std::max<int64_t>(1, tile_width) &&
+           height <= kMaxValues / channels / std::max<int64_t>(1, width);
+  }
+};
 
 /// Width, height, and four bytes a pixel.
 bool is_preview(std::span<const uint8_t> bytes) {
@@ -94,9 +126,12 @@ absl::Status check_exr_header(std::span<const uint8_t> head, uint64_t file_bytes
   const auto magic = c.u32(), version = c.u32();
   if (!version || *magic != kMagic) return bad("it does not start as an EXR does");
   if (*version & kDeepOrParts) return bad("it has several parts or deep pixels; save it as one flat part");
-  for (;;) {
+  for (Extent extent;;) {
     const auto name = c.text();
-    if (name && name->empty()) return absl::OkStatus();
+    if (name && name->empty()) {
+      if (extent.readable()) return absl::OkStatus();
+      return bad("it has more than 2^28 values, 2^20 in a line or 2^24 in a tile; scale it down");
+    }
     const auto type = c.text();
     const auto size = c.u32();
     const auto value = size ? c.take(*size) : std::nullopt;
@@ -104,11 +139,9 @@ absl::Status check_exr_header(std::span<const uint8_t> head, uint64_t file_bytes
       return bad(head.size() < file_bytes ? "its header is damaged or longer than 1 MiB" : "its header ends too early");
     }
     const auto fixed = kSizes.find(*type);
-    const bool fits = fixed != kSizes.end() ? fixed->second == *size
-                      : *type == "chlist"   ? is_channel_list(*value)
-                      : *type == "preview"  ? is_preview(*value)
-                                            : true;
-    if (!fits) return bad("the size of its attribute '" + printable(*name) + "' is wrong");
+    const bool sized = fixed != kSizes.end() ? fixed->second == *size : *type != "preview" || is_preview(*value);
+    if (!sized || !extent.add(*name, *type, *value))
+      return bad("the size of its attribute '" + printable(*name) + "' is wrong");
   }
 }
 

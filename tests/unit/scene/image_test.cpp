@@ -81,6 +81,16 @@ TEST(Exr, RefusesWhatItCannotRead) {
   at[3] = 0x7f;
   ASSERT_TRUE(write_file_atomic(folder / "vast.exr", *bytes).ok());
   EXPECT_THAT(std::string(read_exr(folder / "vast.exr").status().message()), HasSubstr("header ends too early"));
+
+  // So wide that a line would not fit.
+  bytes = read_file(folder / "a.exr");
+  ASSERT_TRUE(bytes.ok());
+  const std::string_view window("dataWindow\0box2i\0", 17);
+  const auto box = std::search(bytes->begin(), bytes->end(), window.begin(), window.end()) + 17 + 4;
+  ASSERT_LT(box, bytes->end() - 16);
+  box[11] = 0x7f;
+  ASSERT_TRUE(write_file_atomic(folder / "wide.exr", *bytes).ok());
+  EXPECT_THAT(std::string(read_exr(folder / "wide.exr").status().message()), HasSubstr("2^20 in a line"));
   EXPECT_FALSE(write_exr(Image(), folder / "empty.exr").ok());
 }
 
