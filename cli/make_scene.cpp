@@ -7,12 +7,14 @@
 #include "core/base/text.h"
 #include "core/scene/builtin.h"
 #include "core/scene/gltf.h"
+#include "core/scene/shapes.h"
 
 namespace lightloom {
 namespace {
 
 struct Options {
   std::string name, output;
+  int subdivide = 0;
 };
 
 std::string names() {
@@ -21,10 +23,16 @@ std::string names() {
   return all;
 }
 
-absl::Status check(const Options& o) { return OutputCheck({}).file("-o", o.output, {".glb"}); }
+absl::Status check(const Options& o) {
+  if (o.subdivide < 0 || o.subdivide > 4) return absl::InvalidArgumentError("--subdivide must be 0 to 4");
+  return OutputCheck({}).file("-o", o.output, {".glb"});
+}
 
 absl::Status run(const Options& o) {
-  LL_ASSIGN_OR_RETURN(const Scene scene, builtin_scene(o.name));
+  LL_ASSIGN_OR_RETURN(Scene scene, builtin_scene(o.name));
+  for (int i = 0; i < o.subdivide; ++i) {
+    for (Object& object : scene.objects) subdivide(&object);
+  }
   LL_RETURN_IF_ERROR(save_gltf(scene, o.output));
   std::printf("%s: %zu objects, %llu triangles, %zu lights\n", escape_controls(o.output).c_str(), scene.objects.size(),
               static_cast<unsigned long long>(scene.triangle_count()), scene.lights.size());
@@ -37,7 +45,9 @@ Command make_scene_command() {
   const auto o = std::make_shared<Options>();
   return {"make-scene",
           "Write a built-in level as .glb",
-          {{"NAME", names(), &o->name, true}, {"-o,--output", ".glb to write", &o->output, true}},
+          {{"NAME", names(), &o->name, true},
+           {"-o,--output", ".glb to write", &o->output, true},
+           {"--subdivide", "cut each triangle into four, so many times", &o->subdivide}},
           [o] { return check(*o); },
           [o] { return run(*o); }};
 }

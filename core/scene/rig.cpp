@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/base/file.h"
+#include "core/base/text.h"
 
 namespace lightloom {
 namespace {
@@ -24,7 +25,7 @@ absl::Status check_keys(const Json& object, const std::set<std::string>& known, 
     if (known.count(key)) continue;
     std::string list;
     for (const std::string& k : known) list += (list.empty() ? "" : ", ") + k;
-    return invalid(where + " has the unknown key \"" + key + "\"; it may have " + list);
+    return invalid(where + " has the unknown key \"" + printable(key) + "\"; it may have " + list);
   }
   return absl::OkStatus();
 }
@@ -109,7 +110,7 @@ absl::StatusOr<Rig> read_rig(const Json& in, std::string where) {
     return invalid(where + ".name must be a string");
   }
   out.name = in["name"].get<std::string>();
-  where += " \"" + out.name + "\"";
+  where += " \"" + printable(out.name) + "\"";
   if (in.contains("lights")) {
     const Json& lights = in["lights"];
     if (!lights.is_array()) return invalid(where + ".lights must be an array");
@@ -121,7 +122,7 @@ absl::StatusOr<Rig> read_rig(const Json& in, std::string where) {
   if (in.contains("emissive")) {
     if (!in["emissive"].is_object()) return invalid(where + ".emissive must be an object of material: [r, g, b]");
     for (const auto& [material, value] : in["emissive"].items()) {
-      LL_ASSIGN_OR_RETURN(out.emission[material], color(value, where + ".emissive." + material));
+      LL_ASSIGN_OR_RETURN(out.emission[material], color(value, where + ".emissive." + printable(material)));
     }
   }
   if (in.contains("environment")) {
@@ -135,7 +136,7 @@ absl::StatusOr<std::vector<Rig>> read_rigs(const std::vector<uint8_t>& data) {
   try {
     root = Json::parse(data.begin(), data.end());
   } catch (const std::exception& e) {
-    return invalid(std::string("is not JSON: ") + e.what());
+    return invalid("is not JSON: " + printable(e.what(), 300));
   }
   if (!root.is_object() || !root.contains("rigs") || !root["rigs"].is_array()) {
     return invalid(R"(must be an object with an array "rigs")");
@@ -145,7 +146,8 @@ absl::StatusOr<std::vector<Rig>> read_rigs(const std::vector<uint8_t>& data) {
   size_t lights = 0;
   for (size_t i = 0; i < root["rigs"].size(); ++i) {
     LL_ASSIGN_OR_RETURN(Rig rig, read_rig(root["rigs"][i], "rigs[" + std::to_string(i) + "]"));
-    if (!names.insert(rig.name).second) return invalid("has two rigs named \"" + rig.name + "\"; rename one");
+    if (!names.insert(rig.name).second)
+      return invalid("has two rigs named \"" + printable(rig.name) + "\"; rename one");
     lights += rig.lights.size();
     if (lights > kMaxLights) return invalid("has more than " + std::to_string(kMaxLights) + " lights; split the file");
     out.push_back(std::move(rig));
@@ -167,9 +169,10 @@ absl::StatusOr<Rig> find_rig(const std::vector<Rig>& rigs, const std::string& na
   std::string known;
   for (const Rig& rig : rigs) {
     if (rig.name == name) return rig;
-    known += (known.empty() ? "" : ", ") + rig.name;
+    known += (known.empty() ? "" : ", ") + printable(rig.name);
   }
-  return absl::NotFoundError("there is no rig \"" + name + "\"; the file has " + (known.empty() ? "none" : known));
+  return absl::NotFoundError("there is no rig \"" + printable(name) + "\"; the file has " +
+                             (known.empty() ? "none" : known));
 }
 
 absl::Status apply_rig(const Rig& rig, Scene* scene) {
@@ -178,7 +181,7 @@ absl::Status apply_rig(const Rig& rig, Scene* scene) {
     bool found = false;
     for (const Material& m : scene->materials) found |= m.name == name;
     if (!found) {
-      return absl::NotFoundError("rig \"" + rig.name + "\" lights the material \"" + name +
+      return absl::NotFoundError("rig \"" + printable(rig.name) + "\" lights the material \"" + printable(name) +
                                  "\", which the level does not have");
     }
   }

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
+#include <utility>
 
 #include "core/base/check.h"
 
@@ -177,6 +179,33 @@ void add_torus(Object* object, Vec3 center, int axis, float radius, float tube, 
   lathe.loop = true;
   for (const Vec2 p : circle(segments / 2)) lathe.profile.push_back({radius + tube * p.x, tube * p.y, false});
   add_lathe(object, lathe, material);
+}
+
+void subdivide(Object* o) {
+  std::map<std::pair<uint32_t, uint32_t>, uint32_t> middles;
+  const auto middle = [&](uint32_t a, uint32_t b) {
+    const auto [it, fresh] = middles.try_emplace(std::minmax(a, b), static_cast<uint32_t>(o->positions.size()));
+    if (fresh) {
+      o->positions.push_back((o->positions[a] + o->positions[b]) * 0.5f);
+      o->normals.push_back(normalize(o->normals[a] + o->normals[b]));
+      for (std::vector<Vec2>* uv : {&o->uv0, &o->uv1}) {
+        if (uv->empty()) continue;
+        const Vec2 p = (*uv)[a], q = (*uv)[b];
+        uv->push_back({(p.x + q.x) * 0.5f, (p.y + q.y) * 0.5f});
+      }
+    }
+    return it->second;
+  };
+  std::vector<Triangle> quarters;
+  for (const Triangle& t : o->triangles) {
+    const auto [a, b, c] = t.v;
+    const uint32_t ab = middle(a, b), bc = middle(b, c), ca = middle(c, a);
+    for (const std::array<uint32_t, 3> v : {std::array{a, ab, ca}, {ab, b, bc}, {ca, bc, c}, {ab, bc, ca}}) {
+      quarters.push_back(t);
+      quarters.back().v = v;
+    }
+  }
+  o->triangles = std::move(quarters);
 }
 
 }  // namespace lightloom

@@ -50,4 +50,7 @@ void add_sphere(Object* object, Vec3 center, float radius, int segments, uint32_
 /// `axis`: 0, 1, 2: the ring's axis. `radius`: to the middle of the tube.
 void add_torus(Object* object, Vec3 center, int axis, float radius, float tube, int segments, uint32_t material);
 
+/// Cuts each triangle into four at the middles of its edges: the same surface.
+void subdivide(Object* object);
+
 }  // namespace lightloom

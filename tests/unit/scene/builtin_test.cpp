@@ -6,6 +6,7 @@
 #include <set>
 #include <tuple>
 
+#include "core/scene/defects.h"
 #include "core/scene/shapes.h"
 #include "tests/unit/scene/gltf_fixture.h"
 
@@ -238,6 +239,30 @@ TEST(SaveGltf, TransformsExtrasAndMaterialsSurvive) {
   EXPECT_EQ(again->materials[2].alpha_mode, AlphaMode::kMask);
   EXPECT_EQ(again->materials[2].alpha_cutoff, 0.25f);
   EXPECT_TRUE(again->materials[2].double_sided);
+}
+
+TEST(Shapes, SubdividingKeepsTheSurface) {
+  Object object;
+  add_sphere(&object, {1, 2, 3}, 2, 8, 0);
+  add_box(&object, {5, 0, 0}, {7, 1, 1}, 1);
+  const auto area = [&] {
+    double sum = 0;
+    for (const Triangle& t : object.triangles) {
+      const Vec3 p = object.positions[t.v[0]];
+      sum += static_cast<double>(length(cross(object.positions[t.v[1]] - p, object.positions[t.v[2]] - p)));
+    }
+    return sum;
+  };
+  const double before = area();
+  const size_t triangles = object.triangles.size();
+  subdivide(&object);
+  EXPECT_EQ(object.triangles.size(), 4 * triangles);
+  EXPECT_NEAR(area(), before, 1e-5 * before);
+  EXPECT_EQ(object.normals.size(), object.positions.size());
+  // Every edge still has its neighbour.
+  Scene scene;
+  scene.objects.push_back(object);
+  EXPECT_EQ(find_defects(scene), Defects{});
 }
 
 }  // namespace
