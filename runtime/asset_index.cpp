@@ -4,6 +4,8 @@
 #include <string>
 #include <utility>
 
+#include "core/base/text.h"
+
 namespace lightloom {
 namespace {
 
@@ -102,7 +104,7 @@ absl::Status AssetIndex::add_objects(const Manifest& m) {
     o.first_element = static_cast<uint32_t>(elements);
     if (entry.surface.size != 0) {
       const std::optional<uint32_t> texels = texels_of(entry.surface.size);
-      if (!texels) return corrupt("surface of object '" + entry.name + "'", "no surface has that size");
+      if (!texels) return corrupt("surface of object '" + printable(entry.name) + "'", "no surface has that size");
       o.elements = *texels;
     }
     elements += o.elements;

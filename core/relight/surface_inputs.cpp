@@ -7,6 +7,7 @@
 #include "core/asset/asset.h"
 #include "core/bake/plan.h"
 #include "core/base/sampling.h"
+#include "core/base/text.h"
 #include "core/receivers/texel_opening.h"
 #include "core/reference/path_tracer.h"
 
@@ -44,11 +45,11 @@ absl::StatusOr<SurfaceElements> load_surface_elements(const std::filesystem::pat
   receivers.ranges.resize(scene.objects.size());
   for (const ObjectEntry& entry : manifest.objects) {
     const auto it = scene_object.find(entry.id);
-    if (it == scene_object.end()) return stale("object '" + entry.name + "' is missing");
+    if (it == scene_object.end()) return stale("object '" + printable(entry.name) + "' is missing");
     const uint32_t o = it->second;
     const LightmapUv& uv = out.layout.uv[o];
     if (uv.width != entry.width || uv.height != entry.height)
-      return stale("the lightmap of '" + entry.name + "' differs");
+      return stale("the lightmap of '" + printable(entry.name) + "' differs");
     // The asset's placement is in force: an incremental bake keeps old places.
     out.layout.placements[o] = {entry.x, entry.y};
     receivers.ranges[o].begin = static_cast<uint32_t>(receivers.all.size());
@@ -63,7 +64,7 @@ absl::StatusOr<SurfaceElements> load_surface_elements(const std::filesystem::pat
         r.key = key;
         r.back = key >= texels;
         const size_t texel = find_texel(receivers.grids[o], key % texels % width, key % texels / width);
-        if (texel == receivers.grids[o].texels.size()) return stale("the lightmap of '" + entry.name + "' differs");
+        if (texel == receivers.grids[o].texels.size()) return stale("the lightmap of '" + printable(entry.name) + "' differs");
         const Texel& t = receivers.grids[o].texels[texel];
         r.texel = static_cast<uint32_t>(texel);
         r.point = shading_point(scene.objects[o], t.triangle, t.b1, t.b2, r.back);

@@ -11,6 +11,7 @@
 #include <system_error>
 
 #include "core/base/file.h"
+#include "core/base/text.h"
 #include "core/scene/exr_header.h"
 #include "core/scene/image.h"
 
@@ -49,7 +50,7 @@ absl::Status write_exr(const Image& image, const fs::path& path) {
     header.compression() = Imf::ZIP_COMPRESSION;
     Imf::FrameBuffer frame;
     for (const Image::Channel& c : image.channels) {
-      if (c.values.size() != pixels) return cannot_write(path, "channel " + c.name + " has the wrong size");
+      if (c.values.size() != pixels) return cannot_write(path, "channel " + printable(c.name) + " has the wrong size");
       header.channels().insert(c.name, Imf::Channel(Imf::FLOAT));
       // OpenEXR's slices are not const, but writing only reads them.
       auto* base = reinterpret_cast<char*>(const_cast<float*>(c.values.data()));
@@ -81,7 +82,7 @@ absl::StatusOr<Image> read_exr(const fs::path& path) {
     int64_t count = 0;
     for (auto c = file.header().channels().begin(); c != file.header().channels().end(); ++c) {
       if (c.channel().xSampling != 1 || c.channel().ySampling != 1) {
-        return broken(std::string("channel ") + c.name() + " is subsampled; save it at full resolution");
+        return broken("channel " + printable(c.name()) + " is subsampled; save it at full resolution");
       }
       ++count;
     }
@@ -103,7 +104,7 @@ absl::StatusOr<Image> read_exr(const fs::path& path) {
     file.readPixels(window.min.y, window.max.y);
     return image;
   } catch (const std::exception& e) {
-    return broken(e.what());
+    return broken(printable(e.what(), 300));
   }
 }
 

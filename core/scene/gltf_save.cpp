@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/base/file.h"
+#include "core/base/text.h"
 #include "core/scene/affine.h"
 #include "core/scene/gltf.h"
 
@@ -100,14 +101,14 @@ class Writer {
 
   absl::Status add_texture(const Texture& t) {
     if (!t.srgb)
-      return absl::InvalidArgumentError("texture \"" + t.name + "\" is not sRGB, which glTF has no word for");
+      return absl::InvalidArgumentError("texture \"" + printable(t.name) + "\" is not sRGB, which glTF has no word for");
     std::vector<uint8_t> png;
     const auto append = [](void* out, void* data, int size) {
       auto* bytes = static_cast<std::vector<uint8_t>*>(out);
       bytes->insert(bytes->end(), static_cast<uint8_t*>(data), static_cast<uint8_t*>(data) + size);
     };
     if (!stbi_write_png_to_func(append, &png, t.width, t.height, 4, t.rgba.data(), t.width * 4)) {
-      return absl::ResourceExhaustedError("not enough memory to encode the texture \"" + t.name + "\"");
+      return absl::ResourceExhaustedError("not enough memory to encode the texture \"" + printable(t.name) + "\"");
     }
     const size_t view = add_view(png.data(), png.size(), kNoTarget);
     const auto wrap = [](Wrap w) { return w == Wrap::kRepeat ? 10497 : w == Wrap::kClamp ? 33071 : 33648; };
