@@ -131,7 +131,7 @@ Command bake_command() {
            {"--method", "default, or sl17: Silvennoinen & Lehtinen 2017 as published, to compare with", &o->method},
            {"--spacing", "side of a probe cell, metres; 0: chosen from the level", &p.spacing},
            {"--order", "spherical harmonics order of the probes, 0 to 9", &p.order},
-           {"--probes", "sl17: how many; 0: from the spacing", &p.probes},
+           {"--probes", "sl17: how many, instead of by --spacing; 0: by --spacing", &p.probes},
            {"--links", "probes that each receiver reads; −1: 6 (sl17: 10 on average)", &o->links},
            {"--rays", "gather rays per receiver, rounded up to a × b with a ≤ b ≤ 2a", &p.rays},
            {"--relight-rays", "rays of each probe at run time; −1: 4096 (sl17: 8000)", &o->relight_rays},

@@ -21,6 +21,14 @@ size_t grid_points(const Aabb& bounds, float spacing) {
   return static_cast<size_t>(count);
 }
 
+/// The widest spacing, to 2 %, of a regular grid with so many points over the level.
+float spacing_of(const Aabb& bounds, size_t points) {
+  const Vec3 size = bounds.size();
+  float spacing = std::max({size.x, size.y, size.z, 1e-3f});
+  while (grid_points(bounds, spacing) < points) spacing *= 0.98f;
+  return spacing;
+}
+
 /// Floods from the first empty voxel in front of each front-side receiver.
 void flood_open_space(const RayTracer& tracer, const Receivers& receivers, float side, Voxels* voxels) {
   for (const Receiver& r : receivers.all) {
@@ -32,6 +40,18 @@ void flood_open_space(const RayTracer& tracer, const Receivers& receivers, float
       break;
     }
   }
+}
+
+/// The paper fills the interior: around the outer walls of a level nobody needs probes. A level that is but a plane has
+/// nothing inside of its bounds; then all of them.
+std::vector<Vec3> inside_of(const Aabb& bounds, std::vector<Vec3> points) {
+  std::vector<Vec3> inside;
+  for (const Vec3 p : points) {
+    bool in = true;
+    for (int a = 0; a < 3; ++a) in &= p[a] > bounds.lo[a] && p[a] < bounds.hi[a];
+    if (in) inside.push_back(p);
+  }
+  return inside.empty() ? points : inside;
 }
 
 /// With the cells of a world grid, and numbers within each, as names.
@@ -54,24 +74,26 @@ std::vector<Probe> name_probes(const std::vector<Vec3>& points, float spacing) {
 absl::StatusOr<PlacementResult> place_probes_sl17(const RayTracer& tracer, Receivers* receivers,
                                                   const Sl17Options& options, const Parallel& parallel) {
   const Aabb bounds = tracer.scene().bounds();
-  const float side = options.spacing / kVoxelsPerSpacing;
+  const size_t wanted = static_cast<size_t>(options.count);
+  const float spacing = wanted > 0 ? spacing_of(bounds, wanted) : options.spacing;
+  const float side = spacing / kVoxelsPerSpacing;
   if (const double count = Voxels::count_for(bounds, side); count > Voxels::kMost) {
     return absl::InvalidArgumentError(
         "--method sl17 would need " + std::to_string(static_cast<uint64_t>(count)) +
         " voxels for this level, more than 2^26: give a --spacing of at least " +
-        std::to_string(options.spacing * static_cast<float>(std::cbrt(count / Voxels::kMost)) * 1.05f));
+        std::to_string(spacing * static_cast<float>(std::cbrt(count / Voxels::kMost)) * 1.05f));
   }
   Voxels voxels(tracer.scene(), side);
   flood_open_space(tracer, *receivers, side, &voxels);
-  const std::vector<Vec3> candidates = voxels.connected_near_surfaces();
+  const std::vector<Vec3> candidates = inside_of(bounds, voxels.connected_near_surfaces());
   if (candidates.empty()) {
     return absl::InvalidArgumentError(
         "--method sl17 found no empty voxel next to a surface: give a smaller --spacing than " +
-        std::to_string(options.spacing));
+        std::to_string(spacing));
   }
-  const size_t target = options.count > 0 ? static_cast<size_t>(options.count) : grid_points(bounds, options.spacing);
+  const size_t target = wanted > 0 ? wanted : grid_points(bounds, spacing);
   PlacementResult result;
-  result.probes = name_probes(thin_by_density(candidates, options.spacing, target), options.spacing);
+  result.probes = name_probes(thin_by_density(candidates, spacing, target), options.spacing);
   result.radius = support_radius(result.probes, *receivers, options.overlap);
 
   std::vector<uint8_t> seen(receivers->all.size(), 1);

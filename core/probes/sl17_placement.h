@@ -10,7 +10,7 @@ namespace lightloom {
 
 struct Sl17Options {
   float spacing = 1;  ///< ρ_probes, metres
-  int count = 0;      ///< of probes; 0: as many as a regular grid of that spacing has points over the level
+  int count = 0;      ///< of probes, and ρ follows; 0: as many as a regular grid of that spacing has over the level
   int overlap = 10;   ///< N_overlap, probes that cover a receiver on average
 };
 

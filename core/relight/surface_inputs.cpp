@@ -64,7 +64,8 @@ absl::StatusOr<SurfaceElements> load_surface_elements(const std::filesystem::pat
         r.key = key;
         r.back = key >= texels;
         const size_t texel = find_texel(receivers.grids[o], key % texels % width, key % texels / width);
-        if (texel == receivers.grids[o].texels.size()) return stale("the lightmap of '" + printable(entry.name) + "' differs");
+        if (texel == receivers.grids[o].texels.size())
+          return stale("the lightmap of '" + printable(entry.name) + "' differs");
         const Texel& t = receivers.grids[o].texels[texel];
         r.texel = static_cast<uint32_t>(texel);
         r.point = shading_point(scene.objects[o], t.triangle, t.b1, t.b2, r.back);

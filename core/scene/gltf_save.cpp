@@ -101,7 +101,8 @@ class Writer {
 
   absl::Status add_texture(const Texture& t) {
     if (!t.srgb)
-      return absl::InvalidArgumentError("texture \"" + printable(t.name) + "\" is not sRGB, which glTF has no word for");
+      return absl::InvalidArgumentError("texture \"" + printable(t.name) +
+                                        "\" is not sRGB, which glTF has no word for");
     std::vector<uint8_t> png;
     const auto append = [](void* out, void* data, int size) {
       auto* bytes = static_cast<std::vector<uint8_t>*>(out);

@@ -146,7 +146,8 @@ absl::StatusOr<std::unique_ptr<RayTracer>> RayTracer::create(const Scene& scene)
                                                                    3 * sizeof(uint32_t), object.triangles.size()));
     if (!vertices || !indices) {
       rtcReleaseGeometry(geometry);
-      return absl::ResourceExhaustedError("out of memory for the ray tracer's copy of object '" + printable(object.name) + "'");
+      return absl::ResourceExhaustedError("out of memory for the ray tracer's copy of object '" +
+                                          printable(object.name) + "'");
     }
     std::copy(object.positions.begin(), object.positions.end(), vertices);
     for (const Triangle& t : object.triangles) indices = std::copy(t.v.begin(), t.v.end(), indices);

@@ -53,6 +53,34 @@ TEST(Sl17Placement, ProbesStandInTheRoomAndNotInTheCrate) {
   }
 }
 
+TEST(Sl17Placement, NoProbesAroundTheOuterWalls) {
+  // A house with a doorway, which the flood leaves by.
+  Scene scene;
+  const uint32_t grey = test::add_material(&scene, "grey", {0.5f, 0.5f, 0.5f});
+  const auto box = [&](Vec3 lo, Vec3 hi) { test::add_solid_box(&scene, "part", lo, hi, grey); };
+  box({0, -0.2f, 0}, {4, 0, 4});
+  box({0, 3, 0}, {4, 3.2f, 4});
+  box({0, 0, 0}, {0.2f, 3, 4});
+  box({3.8f, 0, 0}, {4, 3, 4});
+  box({0.2f, 0, 0}, {3.8f, 3, 0.2f});
+  box({0.2f, 0, 3.8f}, {1, 3, 4});
+  box({2, 0, 3.8f}, {3.8f, 3, 4});
+  test::identify(&scene);
+  Level level(std::move(scene), 2);
+  const auto placed = value_or_die(place_probes_sl17(*level.tracer, &level.receivers, {1, 40, 10}, {}));
+  ASSERT_EQ(placed.probes.size(), 40u);
+  for (const Probe& p : placed.probes) {
+    EXPECT_TRUE(p.position.x > 0 && p.position.x < 4 && p.position.y > -0.2f && p.position.y < 3.2f);
+    EXPECT_TRUE(p.position.z > 0 && p.position.z < 4);
+  }
+}
+
+TEST(Sl17Placement, AnOpenPlaneHasProbesToo) {
+  Level level(test::open_plane(3, {1, 1, 1}));
+  const auto placed = value_or_die(place_probes_sl17(*level.tracer, &level.receivers, {1, 8, 10}, {}));
+  EXPECT_EQ(placed.probes.size(), 8u);
+}
+
 TEST(Sl17Placement, RadiusCoversReceiversByTheOverlapOnAverage) {
   Level level(test::closed_box({3, 2, 4}));
   for (const int overlap : {3, 10, 25}) {
