@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <mutex>
+#include <optional>
 
 #include "core/base/stopwatch.h"
 
@@ -80,8 +81,8 @@ absl::StatusOr<BakeReport> bake(const RayTracer& tracer, const BakeParams& param
   std::atomic<uint64_t> rays{0};
   std::vector<Vec3> probes;
   for (const Probe& p : plan.placement.probes) probes.push_back(p.position);
-  VisibilityCache cache(tracer, plan.layout, plan.receivers.grids, probes);
-  VisibilityCache* const visibility = params.method == BakeMethod::kSl17 ? nullptr : &cache;
+  std::optional<VisibilityCache> cache;
+  if (params.method != BakeMethod::kSl17) cache.emplace(tracer, plan.layout, plan.receivers.grids, probes);
   Parallel cell_stage = control.stage("cells");
   if (control.progress) {
     cell_stage.progress = [&](uint64_t finished, uint64_t total) {
@@ -90,7 +91,7 @@ absl::StatusOr<BakeReport> bake(const RayTracer& tracer, const BakeParams& param
   }
   bool done = parallel_for(cells.size(), cell_stage, [&](uint64_t i) {
     if (writer.failed()) return;
-    cells[i] = bake_cell(tracer, visibility, make_cell_task(plan, scene, plan.cells[i]));
+    cells[i] = bake_cell(tracer, cache ? &*cache : nullptr, make_cell_task(plan, scene, plan.cells[i]));
     rays += cells[i].stats.gather_rays + cells[i].stats.visibility_rays;
     cell_refs[i] = writer.put(encode_cell(cells[i].chunk));
   });

@@ -5,12 +5,18 @@
 
 namespace lightloom {
 
+std::array<int32_t, 3> probe_cell(Vec3 p, float spacing) {
+  std::array<int32_t, 3> cell;
+  for (int a = 0; a < 3; ++a) {
+    cell[static_cast<size_t>(a)] = static_cast<int32_t>(std::floor(static_cast<double>(p[a]) / spacing));
+  }
+  return cell;
+}
+
 ProbeGrid::ProbeGrid(std::span<const Probe> probes, float spacing) : probes_(probes), spacing_(spacing) {}
 
 std::vector<ProbeGrid::Near> ProbeGrid::nearest(Vec3 p, int count) const {
-  std::array<int32_t, 3> home{};
-  for (int a = 0; a < 3; ++a)
-    home[static_cast<size_t>(a)] = static_cast<int32_t>(std::floor(static_cast<double>(p[a]) / spacing_));
+  const std::array<int32_t, 3> home = probe_cell(p, spacing_);
   std::vector<Near> found;
   const auto add_row = [&](int32_t x, int32_t y, int32_t z0, int32_t z1) {
     const auto key_less = [](const Probe& a, const std::array<int32_t, 3>& cell) { return a.cell < cell; };

@@ -1,6 +1,8 @@
 // Which probes a receiver reads.
 #pragma once
 
+#include <absl/functional/function_ref.h>
+
 #include <array>
 #include <cstdint>
 #include <span>
@@ -36,6 +38,15 @@ class ProbeGrid {
   std::span<const Probe> probes_;
   float spacing_;
 };
+
+/// Drops the back sides that none of the probes near them sees: they lie in cavities that no light of the level's open
+/// space enters and no camera looks into. Error: cancellation.
+absl::Status drop_unseen_backs(const RayTracer& tracer, std::span<const Probe> probes,
+                               absl::FunctionRef<std::vector<ProbeGrid::Near>(Vec3)> near, Receivers* receivers,
+                               const Parallel& parallel);
+
+/// The cell of side `spacing` of the world grid that p lies in.
+std::array<int32_t, 3> probe_cell(Vec3 p, float spacing);
 
 /// w(t) = 2t³ − 3t² + 1 on [0,1], else 0 (SL17 Eq. 10).
 inline float spatial_weight(float t) { return t < 1 ? (2 * t - 3) * t * t + 1 : 0; }

@@ -22,13 +22,6 @@ constexpr size_t kTestReceivers = 64;  // per cell, for repair
 constexpr uint32_t kTestRaysSide = 4;
 constexpr double kRepairShare = 0.01;  // unseen share of a cell's test rays that calls for repair
 
-Cell cell_of(Vec3 p, float spacing) {
-  Cell c;
-  for (int a = 0; a < 3; ++a)
-    c[static_cast<size_t>(a)] = static_cast<int32_t>(std::floor(static_cast<double>(p[a]) / spacing));
-  return c;
-}
-
 uint64_t cell_seed(const Cell& c) {
   uint64_t h = 0x9b0be;
   for (const int32_t i : c) h = hash_combine(h, static_cast<uint64_t>(static_cast<uint32_t>(i)));
@@ -122,7 +115,7 @@ std::vector<Probe> repair(const RayTracer& tracer, const Cell& cell, float spaci
     const float distance = length(way);
     for (const float step : {0.1f, 0.3f}) {  // of a cell, but not past the middle
       const Vec3 p = u.from + way * std::min(0.5f, step * spacing / distance);
-      if (cell_of(p, spacing) == cell) points.push_back(p);
+      if (probe_cell(p, spacing) == cell) points.push_back(p);
     }
   }
   thin(&points, kMaxCandidates);
@@ -170,7 +163,7 @@ std::vector<Probe> repair(const RayTracer& tracer, const Cell& cell, float spaci
 std::vector<Cell> base_cells(const Receivers& receivers, float spacing) {
   std::set<Cell> home;
   for (const Receiver& r : receivers.all) {
-    if (!r.back) home.insert(cell_of(r.point.position, spacing));
+    if (!r.back) home.insert(probe_cell(r.point.position, spacing));
   }
   std::set<Cell> cells = home;
   for (const Cell& c : home) {
@@ -195,7 +188,7 @@ struct Home {
 std::vector<Home> repair_homes(const Receivers& receivers, float spacing) {
   std::map<Cell, std::vector<uint32_t>> by_cell;
   for (uint32_t r = 0; r < receivers.all.size(); ++r) {
-    by_cell[cell_of(receivers.all[r].point.position, spacing)].push_back(r);
+    by_cell[probe_cell(receivers.all[r].point.position, spacing)].push_back(r);
   }
   std::vector<Home> homes;
   for (auto& [cell, list] : by_cell) {
@@ -209,6 +202,23 @@ std::vector<Home> repair_homes(const Receivers& receivers, float spacing) {
 }
 
 }  // namespace
+
+absl::Status drop_unseen_backs(const RayTracer& tracer, std::span<const Probe> probes,
+                               absl::FunctionRef<std::vector<ProbeGrid::Near>(Vec3)> near, Receivers* receivers,
+                               const Parallel& parallel) {
+  std::vector<uint8_t> seen(receivers->all.size(), 1);
+  const bool done = parallel_for(receivers->all.size(), parallel, [&](uint64_t i) {
+    const Receiver& r = receivers->all[i];
+    if (!r.back) return;
+    const auto found = near(r.point.position);
+    seen[i] = std::any_of(found.begin(), found.end(), [&](const ProbeGrid::Near& n) {
+      return tracer.visible(r.point.position, probes[n.probe].position);
+    });
+  });
+  if (!done) return absl::CancelledError("cancelled while placing probes");
+  receivers->retain(std::vector<bool>(seen.begin(), seen.end()));
+  return absl::OkStatus();
+}
 
 absl::StatusOr<PlacementResult> place_probes(const RayTracer& tracer, Receivers* receivers,
                                              const PlacementOptions& options, const Parallel& parallel) {
@@ -227,21 +237,12 @@ absl::StatusOr<PlacementResult> place_probes(const RayTracer& tracer, Receivers*
   const ProbeGrid grid(result.probes, spacing);
 
   // Back sides that are seen.
-  std::vector<uint8_t> seen(receivers->all.size(), 1);
-  bool done = parallel_for(receivers->all.size(), parallel, [&](uint64_t i) {
-    const Receiver& r = receivers->all[i];
-    if (!r.back) return;
-    const auto near = grid.nearest(r.point.position, options.nearest);
-    seen[i] = std::any_of(near.begin(), near.end(), [&](const ProbeGrid::Near& n) {
-      return tracer.visible(r.point.position, result.probes[n.probe].position);
-    });
-  });
-  if (!done) return absl::CancelledError("cancelled while placing probes");
-  receivers->retain(std::vector<bool>(seen.begin(), seen.end()));
+  LL_RETURN_IF_ERROR(drop_unseen_backs(
+      tracer, result.probes, [&](Vec3 p) { return grid.nearest(p, options.nearest); }, receivers, parallel));
 
   // Repairs, each decided from base probes alone.
   std::vector<Home> homes = repair_homes(*receivers, spacing);
-  done = parallel_for(homes.size(), parallel, [&](uint64_t i) {
+  const bool done = parallel_for(homes.size(), parallel, [&](uint64_t i) {
     Home& h = homes[i];
     auto unseen = unseen_hits(tracer, *receivers, h.tested, result.probes, grid, options.nearest, &h.rays);
     h.unseen = unseen.size();

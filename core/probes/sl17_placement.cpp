@@ -59,10 +59,7 @@ std::vector<Probe> name_probes(const std::vector<Vec3>& points, float spacing) {
   std::map<std::array<int32_t, 3>, uint32_t> in_cell;
   std::vector<Probe> out;
   for (const Vec3 p : points) {
-    std::array<int32_t, 3> cell;
-    for (size_t a = 0; a < 3; ++a) {
-      cell[a] = static_cast<int32_t>(std::floor(static_cast<double>(p[static_cast<int>(a)]) / spacing));
-    }
+    const auto cell = probe_cell(p, spacing);
     out.push_back({p, cell, in_cell[cell]++});
   }
   std::sort(out.begin(), out.end(), [](const Probe& a, const Probe& b) { return a.key() < b.key(); });
@@ -96,18 +93,9 @@ absl::StatusOr<PlacementResult> place_probes_sl17(const RayTracer& tracer, Recei
   result.probes = name_probes(thin_by_density(candidates, spacing, target), options.spacing);
   result.radius = support_radius(result.probes, *receivers, options.overlap);
 
-  std::vector<uint8_t> seen(receivers->all.size(), 1);
   const ProbeGrid grid(result.probes, options.spacing);
-  const bool done = parallel_for(receivers->all.size(), parallel, [&](uint64_t i) {
-    const Receiver& r = receivers->all[i];
-    if (!r.back) return;
-    const auto near = grid.within(r.point.position, result.radius);
-    seen[i] = std::any_of(near.begin(), near.end(), [&](const ProbeGrid::Near& n) {
-      return tracer.visible(r.point.position, result.probes[n.probe].position);
-    });
-  });
-  if (!done) return absl::CancelledError("cancelled while placing probes");
-  receivers->retain(std::vector<bool>(seen.begin(), seen.end()));
+  LL_RETURN_IF_ERROR(drop_unseen_backs(
+      tracer, result.probes, [&](Vec3 p) { return grid.within(p, result.radius); }, receivers, parallel));
   return result;
 }
 
