@@ -8,11 +8,18 @@
 namespace lightloom {
 namespace {
 
+struct Reader {
+  ChunkStore store;
+  absl::Status status;  ///< of the newest chunk
+};
+
 int read_chunk(void* user, const uint8_t digest[32], uint64_t size, void* out) {
+  auto* reader = static_cast<Reader*>(user);
   ChunkRef ref;
   std::copy(digest, digest + 32, ref.digest.bytes.begin());
   ref.size = size;
-  const auto bytes = static_cast<const ChunkStore*>(user)->get(ref);
+  const auto bytes = reader->store.get(ref);
+  reader->status = bytes.status();
   if (!bytes.ok()) return 1;
   std::copy(bytes->begin(), bytes->end(), static_cast<uint8_t*>(out));
   return 0;
@@ -33,14 +40,15 @@ absl::Status RuntimeMessages::status(lightloom_result result) const {
 
 absl::Status load_loom(const std::filesystem::path& loom, const RuntimeMessages& messages, lightloom_runtime* runtime) {
   LL_ASSIGN_OR_RETURN(const auto manifest, read_file(loom / "manifest"));
-  ChunkStore store = chunk_store(loom);
+  Reader reader{chunk_store(loom), absl::OkStatus()};
   lightloom_asset_info asset{};
   asset.struct_size = sizeof asset;
   asset.manifest = manifest.data();
   asset.manifest_bytes = manifest.size();
   asset.read_chunk = read_chunk;
-  asset.read_user = &store;
-  return messages.status(lightloom_load(runtime, &asset));
+  asset.read_user = &reader;
+  const absl::Status loaded = messages.status(lightloom_load(runtime, &asset));
+  return reader.status.ok() ? loaded : reader.status;
 }
 
 absl::Status set_albedo_emission_sky(const SurfaceInputs& inputs, Vec3 environment, const RuntimeMessages& messages,

@@ -9,7 +9,7 @@
 namespace lightloom {
 
 /// Loads and validates a level. Every error is one line that names the file and the glTF element and says how to mend
-/// it. Usable defects (zero-area triangles, non-finite vertices, missing normals, …) are mended and end in
+/// it. Usable defects (zero-area triangles, missing normals, …) are mended and end in
 /// Scene::warnings.
 ///
 /// Node `extras` understood: "lightloom": {"static": bool, "texel_scale": number > 0, "receive":

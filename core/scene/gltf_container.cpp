@@ -35,6 +35,7 @@ struct Folder {
   fs::path path;
   uint64_t bytes_left = kMaxLinkedBytes;
   std::string refused;  ///< the first URI that left the folder
+  std::string missing;  ///< the first URI that no file has
 };
 
 bool stays_inside(std::string_view uri) {
@@ -53,7 +54,9 @@ bool file_exists(const std::string& uri, void* user) {
     return false;
   }
   std::error_code error;
-  return fs::is_regular_file(folder.path / uri, error);
+  const bool there = fs::is_regular_file(folder.path / uri, error);
+  if (!there && folder.missing.empty()) folder.missing = uri;
+  return there;
 }
 
 std::string expand_path(const std::string& uri, void*) { return uri; }
@@ -183,7 +186,7 @@ absl::StatusOr<std::unique_ptr<tinygltf::Model>> read_gltf_model(const fs::path&
     return absl::InvalidArgumentError("is larger than 4 GiB; move its buffers into .bin files");
   }
   LL_ASSIGN_OR_RETURN(const std::vector<uint8_t> data, read_file(path));
-  if (data.empty()) return absl::InvalidArgumentError("is empty");
+  if (data.empty()) return absl::InvalidArgumentError("is empty; export it again");
 
   const bool binary = data.size() >= 4 && std::memcmp(data.data(), "glTF", 4) == 0;
   std::string_view json(reinterpret_cast<const char*>(data.data()), data.size());
@@ -211,6 +214,10 @@ absl::StatusOr<std::unique_ptr<tinygltf::Model>> read_gltf_model(const fs::path&
   if (!folder.refused.empty()) {
     return absl::InvalidArgumentError("links to " + shown(folder.refused) +
                                       ", which is not in the file's folder; copy it there and link to it by its name");
+  }
+  // A missing image may belong to a texture that nothing uses: that is for later.
+  if (!ok && !folder.missing.empty() && error.find(folder.missing) != error.npos) {
+    return absl::NotFoundError("links to " + shown(folder.missing) + ", which is missing; put it beside the glTF file");
   }
   if (!ok || !error.empty()) {
     return absl::InvalidArgumentError("is not readable as glTF: " + one_line(error) + "; export it again");

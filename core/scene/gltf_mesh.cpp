@@ -88,14 +88,11 @@ uint64_t append(const std::vector<float>& values, uint64_t count, std::vector<Ve
   return bad;
 }
 
-enum class Defect { kNone, kNotFinite, kNoArea };
+bool usable(Vec3 p) {
+  return is_finite(p) && std::abs(p.x) <= kFarthest && std::abs(p.y) <= kFarthest && std::abs(p.z) <= kFarthest;
+}
 
-Defect defect(const std::array<Vec3, 3>& p) {
-  for (const Vec3 v : p) {
-    if (!is_finite(v) || std::abs(v.x) > kFarthest || std::abs(v.y) > kFarthest || std::abs(v.z) > kFarthest) {
-      return Defect::kNotFinite;
-    }
-  }
+bool has_area(const std::array<Vec3, 3>& p) {
   // In double, where the products of float differences are all but exact.
   const auto edge = [&](size_t i) {
     return Dvec3{double{p[i].x} - p[0].x, double{p[i].y} - p[0].y, double{p[i].z} - p[0].z};
@@ -103,7 +100,7 @@ Defect defect(const std::array<Vec3, 3>& p) {
   const Dvec3 a = edge(1), b = edge(2);
   const double x = a[1] * b[2] - a[2] * b[1], y = a[2] * b[0] - a[0] * b[2], z = a[0] * b[1] - a[1] * b[0];
   // Below this, the normal cannot be computed in float.
-  return std::sqrt(x * x + y * y + z * z) > 1e-18 ? Defect::kNone : Defect::kNoArea;
+  return std::sqrt(x * x + y * y + z * z) > 1e-18;
 }
 
 template <class T>
@@ -246,15 +243,16 @@ absl::Status MeshReader::read(int mesh, Object* object) {
     const Dvec3 w = transform_point(object->transform, {p.x, p.y, p.z});
     world.push_back({static_cast<float>(w[0]), static_cast<float>(w[1]), static_cast<float>(w[2])});
   }
-  uint64_t not_finite = 0, no_area = 0;
-  std::erase_if(local.triangles, [&](const Triangle& t) {
-    const Defect d = defect({world[t.v[0]], world[t.v[1]], world[t.v[2]]});
-    not_finite += d == Defect::kNotFinite;
-    no_area += d == Defect::kNoArea;
-    return d != Defect::kNone;
+  for (const Triangle& t : local.triangles) {
+    if (usable(world[t.v[0]]) && usable(world[t.v[1]]) && usable(world[t.v[2]])) continue;
+    return invalid(
+        "mesh " + std::to_string(mesh) + " of object " + shown(object->name) +
+        ": a triangle has a corner that is not a number, or over 1e9 m away; mend the mesh and export it again");
+  }
+  const uint64_t no_area = std::erase_if(local.triangles, [&](const Triangle& t) {
+    return !has_area({world[t.v[0]], world[t.v[1]], world[t.v[2]]});
   });
-  if (not_finite) warnings_->add("triangles with vertices that are not finite were left out", object->name, not_finite);
-  if (no_area) warnings_->add("triangles without area were left out", object->name, no_area);
+  if (no_area > 0) warnings_->add("triangles without area were left out", object->name, no_area);
 
   // Vertices that no triangle uses go.
   std::vector<uint32_t> index(local.positions.size(), 0), kept;

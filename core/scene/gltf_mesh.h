@@ -25,7 +25,7 @@ class MeshReader {
       : model_(model), scene_(scene), warnings_(warnings), hasher_(*scene) {}
 
   /// Fills the geometry and mesh_hash of an object whose name and transform are set: all primitives merged,
-  /// without triangles that have no area or are not finite. May leave no triangles.
+  /// without triangles that have no area. May leave no triangles.
   absl::Status read(int mesh, Object* object);
 
  private:

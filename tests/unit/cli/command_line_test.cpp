@@ -1,101 +1,22 @@
 // What the program does with command lines and files that are wrong: one line on stderr that says what, where and how to
 // mend it, the right exit code, and nothing lost.
-#include <fcntl.h>
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <sys/stat.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <csignal>
-#include <filesystem>
-#include <fstream>
-#include <string>
 #include <thread>
-#include <vector>
 
-#include "core/scene/builtin.h"
-#include "core/scene/gltf.h"
-#include "tests/support/baked_level.h"
+#include "tests/support/program.h"
 
 namespace lightloom {
 namespace {
 
 namespace fs = std::filesystem;
-using ::testing::EndsWith;
+using test::text_of;
+using test::write;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-std::string text_of(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
-void write(const fs::path& path, const std::string& text) { std::ofstream(path, std::ios::binary) << text; }
-
-struct Result {
-  int code = -1;  ///< -signal if one ended it
-  std::string out, err;
-};
-
-class CommandLine : public ::testing::Test {
- protected:
-  void SetUp() override {
-    scene_ = (folder_.path() / "level.glb").string();
-    ASSERT_TRUE(save_gltf(*builtin_scene("cornell"), scene_).ok());
-  }
-
-  std::string path(const std::string& name) const { return (folder_.path() / name).string(); }
-
-  pid_t start(const std::vector<std::string>& arguments, const std::string& out = "") {
-    std::vector<char*> argv = {const_cast<char*>(LIGHTLOOM_PROGRAM)};
-    for (const std::string& a : arguments) argv.push_back(const_cast<char*>(a.c_str()));
-    argv.push_back(nullptr);
-    const std::string out_path = out.empty() ? path("out.txt") : out, err_path = path("err.txt"),
-                      cwd = folder_.path().string();
-    const pid_t child = ::fork();
-    if (child == 0) {
-      const int o = ::open(out_path.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644);
-      const int e = ::open(err_path.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644);
-      if (o < 0 || e < 0 || ::chdir(cwd.c_str()) != 0) ::_exit(126);
-      ::dup2(o, STDOUT_FILENO);
-      ::dup2(e, STDERR_FILENO);
-      ::execv(LIGHTLOOM_PROGRAM, argv.data());
-      ::_exit(127);
-    }
-    return child;
-  }
-  Result finish(pid_t child) {
-    int status = 0;
-    EXPECT_EQ(::waitpid(child, &status, 0), child);
-    return {WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status), text_of(path("out.txt")),
-            text_of(path("err.txt"))};
-  }
-  Result run(const std::vector<std::string>& arguments, const std::string& out = "") {
-    return finish(start(arguments, out));
-  }
-
-  /// It fails with this code, and one line that holds `what`. Returns the line.
-  std::string fails(int code, const std::vector<std::string>& arguments, const std::string& what) {
-    const Result r = run(arguments);
-    EXPECT_EQ(r.code, code) << r.err;
-    EXPECT_EQ(std::count(r.err.begin(), r.err.end(), '\n'), 1) << r.err;
-    EXPECT_THAT(r.err, EndsWith("\n"));
-    EXPECT_THAT(r.err, HasSubstr(what));
-    return r.err;
-  }
-
-  std::string baked() {
-    const std::string loom = path("level.loom");
-    const Result r = run({"bake", scene_, "-o", loom, "--texels-per-metre", "2", "--rays", "16", "--relight-rays", "64",
-                          "--max-rank", "4"});
-    EXPECT_EQ(r.code, 0) << r.err;
-    return loom;
-  }
-
-  test::TemporaryFolder folder_;
-  std::string scene_;
-};
+class CommandLine : public test::ProgramTest {};
 
 TEST_F(CommandLine, HelpAndVersionSucceed) {
   EXPECT_THAT(run({"--help"}).out, HasSubstr("make-scene"));

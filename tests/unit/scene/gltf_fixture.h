@@ -65,14 +65,14 @@ struct TestGltf {
     return static_cast<int>(json["accessors"].size()) - 1;
   }
 
-  /// A .gltf, its buffer beside it unless `json` says where.
-  absl::StatusOr<Scene> load() {
-    const std::filesystem::path folder = test_folder();
+  /// level.gltf, its buffer beside it unless `json` says where.
+  std::filesystem::path save(const std::filesystem::path& folder) {
     if (!json.contains("buffers")) json["buffers"] = {{{"uri", "data.bin"}, {"byteLength", bin.size()}}};
     EXPECT_TRUE(write_file_atomic(folder / "data.bin", bin).ok());
     EXPECT_TRUE(write_file_atomic(folder / "level.gltf", json.dump()).ok());
-    return load_gltf(folder / "level.gltf");
+    return folder / "level.gltf";
   }
+  absl::StatusOr<Scene> load() { return load_gltf(save(test_folder())); }
 };
 
 }  // namespace lightloom

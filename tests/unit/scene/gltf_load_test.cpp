@@ -146,17 +146,16 @@ TEST(GltfLoad, SparseOverNothing) {
 
 TEST(GltfLoad, DefectiveTrianglesAreLeftOut) {
   TestGltf g;
+  // A good triangle, one whose corners lie on a line, and a vertex that is not a number and not used.
   const float nan = std::numeric_limits<float>::quiet_NaN();
-  // A good triangle, one with a NaN, and one whose corners lie on a line.
   g.primitive()["attributes"] = {
       {"POSITION", g.accessor(std::vector<float>{0, 0, 0, 1, 0, 0, 0, 1, 0, nan, 0, 0, 2, 0, 0}, "VEC3", 5126)}};
-  g.primitive()["indices"] = g.accessor(std::vector<uint32_t>{0, 1, 2, 0, 1, 3, 0, 1, 4}, "SCALAR", 5125);
+  g.primitive()["indices"] = g.accessor(std::vector<uint32_t>{0, 1, 2, 0, 1, 4}, "SCALAR", 5125);
   LOAD(scene, g);
   EXPECT_EQ(scene.triangle_count(), 1u);
   EXPECT_EQ(scene.bounds().hi, (Vec3{1, 1, 0}));
   EXPECT_THAT(scene.warnings,
-              ElementsAre(HasSubstr("no normals"), HasSubstr("1 triangles with vertices that are not finite"),
-                          HasSubstr("1 triangles without area were left out (in \"tri\")")));
+              ElementsAre(HasSubstr("no normals"), HasSubstr("1 triangles without area were left out (in \"tri\")")));
 }
 
 TEST(GltfLoad, Materials) {
