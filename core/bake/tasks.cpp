@@ -106,6 +106,7 @@ CellResult bake_cell(const RayTracer& tracer, VisibilityCache* cache, const Cell
   options.max_rank = task.params.max_rank;
   options.threshold = task.params.threshold;
   options.weigh_bands = !sl17;
+  if (sl17) options.probe_loss = 0;
   options.relight_rays = static_cast<uint32_t>(task.params.relight_rays);
   options.seed = task.seed;
   CompressedCell compressed = compress_cell(transport, positions, options);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "core/base/check.h"
 #include "core/base/rng.h"
@@ -10,82 +11,102 @@
 namespace lightloom {
 namespace {
 
-/// Rows and columns of T that a cluster uses.
-struct Block {
-  std::vector<uint32_t> probes;
-  Matrix t;  // receivers × (probes·J)
-};
-
-Block extract(const Matrix& transport, std::span<const uint32_t> rows, Eigen::Index J) {
-  Block block;
-  const Eigen::Index probes = transport.cols() / J;
-  for (Eigen::Index p = 0; p < probes; ++p) {
-    const bool used = std::any_of(rows.begin(), rows.end(),
-                                  [&](uint32_t r) { return (transport.row(r).segment(p * J, J).array() != 0).any(); });
-    if (used) block.probes.push_back(static_cast<uint32_t>(p));
-  }
-  block.t.resize(static_cast<Eigen::Index>(rows.size()), static_cast<Eigen::Index>(block.probes.size()) * J);
-  for (size_t r = 0; r < rows.size(); ++r) {
-    for (size_t p = 0; p < block.probes.size(); ++p) {
-      block.t.row(static_cast<Eigen::Index>(r)).segment(static_cast<Eigen::Index>(p) * J, J) =
-          transport.row(rows[r]).segment(block.probes[p] * J, J);
-    }
-  }
-  return block;
-}
-
-/// W: the expected size of a radiance coefficient of band l, relative to band 0.
-Eigen::RowVectorXf band_weights(const CompressionOptions& o, size_t probes) {
-  const int order = o.order, J = sh_count(order);
-  Eigen::RowVectorXf w(static_cast<Eigen::Index>(probes) * J);
-  for (size_t p = 0; p < probes; ++p) {
-    for (int l = 0; l <= order; ++l) {
-      for (int j = l * l; j < (l + 1) * (l + 1); ++j) {
-        w(static_cast<Eigen::Index>(p) * J + j) = o.weigh_bands ? 1.0f / static_cast<float>(1 + l) : 1.0f;
-      }
-    }
+/// W: the expected size of a radiance coefficient of band l, relative to band 0. For one probe.
+Eigen::RowVectorXf band_weights(const CompressionOptions& o) {
+  Eigen::RowVectorXf w(sh_count(o.order));
+  for (int l = 0; l <= o.order; ++l) {
+    for (int j = l * l; j < (l + 1) * (l + 1); ++j) w(j) = o.weigh_bands ? 1.0f / static_cast<float>(1 + l) : 1.0f;
   }
   return w;
 }
 
+/// ‖T_rp·W‖² per receiver r of `rows` and probe p.
+Eigen::MatrixXf energies(const Matrix& transport, std::span<const uint32_t> rows, const Eigen::RowVectorXf& w) {
+  const Eigen::Index J = w.size();
+  Eigen::MatrixXf out(static_cast<Eigen::Index>(rows.size()), transport.cols() / J);
+  for (Eigen::Index r = 0; r < out.rows(); ++r) {
+    const auto row = transport.row(rows[static_cast<size_t>(r)]);
+    for (Eigen::Index p = 0; p < out.cols(); ++p) out(r, p) = row.segment(p * J, J).cwiseProduct(w).squaredNorm();
+  }
+  return out;
+}
+
+/// The probes that a cluster keeps, ascending: the weakest go while no receiver loses more than `share` of its row.
+std::vector<uint32_t> strong_probes(const Eigen::MatrixXf& energy, float share) {
+  const Eigen::RowVectorXf of_probe = energy.colwise().sum();
+  const Eigen::VectorXf allowed = share * energy.rowwise().sum();
+  std::vector<uint32_t> weakest_first(static_cast<size_t>(energy.cols()));
+  std::iota(weakest_first.begin(), weakest_first.end(), 0u);
+  std::stable_sort(weakest_first.begin(), weakest_first.end(),
+                   [&](uint32_t a, uint32_t b) { return of_probe(a) < of_probe(b); });
+  std::vector<uint32_t> kept;
+  Eigen::VectorXf lost = Eigen::VectorXf::Zero(energy.rows());
+  for (const uint32_t p : weakest_first) {
+    const Eigen::VectorXf without = lost + energy.col(p);
+    if ((without.array() <= allowed.array()).all()) {
+      lost = without;
+    } else {
+      kept.push_back(p);
+    }
+  }
+  std::sort(kept.begin(), kept.end());
+  return kept;
+}
+
 struct Truncated {
-  Block block;
-  Eigen::VectorXf uniform;  // E under the uniform field 1, per receiver
-  TruncatedSvd svd;         // of the rest, in the weighted norm
-  Eigen::RowVectorXf weights;
+  std::vector<uint32_t> probes;
+  Eigen::VectorXf uniform;     // e, per receiver
+  Eigen::RowVectorXf weights;  // W
+  TruncatedSvd svd;            // of T′·W
   Eigen::Index rank = 0;
+  bool met = false;              // the threshold
   double error2 = 0, norm2 = 0;  // ‖(T − T̃)W‖², ‖TW‖²
 };
 
-/// Splits off the uniform field, then truncates what is left.
+/// Leaves weak probes out, splits off the uniform field, then truncates what is left.
 ///
-/// u: coefficients of the uniform field 1 at every probe; d: the row that reads the mean radiance, √(4π)/(4πP) in every DC
-/// entry, so d·u = 1. T = e·d + T′ with e = T·u, hence T′·u = 0: whatever the SVD of T′ loses, the uniform field loses
-/// nothing.
+/// u: coefficients of the uniform field 1 at every probe; e = T·u: E under it. d: the row that reads the mean radiance of
+/// the probes that are kept, √(4π)/(4πP) in every DC entry, so d·u = 1. T′ = T − e·d, truncated, without what it says to u:
+/// T̃ = e·d + (U·ΣVᵀ)·(I − u·d). Whatever was left out and truncated, the uniform field lost nothing.
 Truncated truncate(const Matrix& transport, std::span<const uint32_t> rows, const CompressionOptions& o,
                    std::span<const float> u, uint64_t seed) {
-  const Eigen::Index J = sh_count(o.order);
+  const Eigen::Index J = sh_count(o.order), receivers = static_cast<Eigen::Index>(rows.size());
+  const Eigen::RowVectorXf w = band_weights(o);
+  const Eigen::MatrixXf energy = energies(transport, rows, w);
+  const double budget = double{o.threshold} * o.threshold;
   Truncated out;
-  out.block = extract(transport, rows, J);
-  Matrix rest = out.block.t;
-  const Eigen::Index probes = static_cast<Eigen::Index>(out.block.probes.size());
-  out.uniform = Eigen::VectorXf::Zero(rest.rows());
-  const Eigen::Map<const Eigen::VectorXf> u_map(u.data(), J);
-  for (Eigen::Index p = 0; p < probes; ++p) out.uniform += rest.middleCols(p * J, J) * u_map;
-  for (Eigen::Index p = 0; p < probes; ++p) {
-    rest.col(p * J) -= out.uniform * (kShUniform / (4 * kPi * static_cast<float>(probes)));
+  out.probes = strong_probes(energy, static_cast<float>(o.probe_loss * budget));
+  const Eigen::Index probes = static_cast<Eigen::Index>(out.probes.size());
+
+  const Eigen::Map<const Eigen::RowVectorXf> field(u.data(), J);
+  const Eigen::RowVectorXf everywhere = field.replicate(1, transport.cols() / J);
+  Matrix kept(receivers, probes * J);  // columns of T·W
+  out.uniform.resize(receivers);
+  for (Eigen::Index r = 0; r < receivers; ++r) {
+    const auto row = transport.row(rows[static_cast<size_t>(r)]);
+    out.uniform(r) = row.dot(everywhere);
+    for (Eigen::Index p = 0; p < probes; ++p) {
+      kept.row(r).segment(p * J, J) = row.segment(out.probes[static_cast<size_t>(p)] * J, J).cwiseProduct(w);
+    }
   }
-  out.weights = band_weights(o, out.block.probes.size());
-  out.norm2 = (out.block.t.array().rowwise() * out.weights.array()).matrix().squaredNorm();
-  rest.array().rowwise() *= out.weights.array();
+  Eigen::RowVectorXf d = Eigen::RowVectorXf::Zero(probes * J);  // d·W: the weight of band 0 is 1
+  for (Eigen::Index p = 0; p < probes; ++p) d(p * J) = kShUniform / (4 * kPi * static_cast<float>(probes));
+
+  const Matrix rest = kept - out.uniform * d;
   out.svd = truncated_svd(rest, o.max_rank, seed);
+  out.norm2 = energy.sum();
+  const double left_out = std::max(0.0, out.norm2 - kept.squaredNorm()), allowed = budget * out.norm2 - left_out;
   double tail = rest.squaredNorm();
-  const double allowed = static_cast<double>(o.threshold) * o.threshold * out.norm2;
   while (out.rank < out.svd.sigma.size() && tail > allowed) {
     tail -= out.svd.sigma(out.rank) * out.svd.sigma(out.rank);
     ++out.rank;
   }
-  out.error2 = std::max(0.0, tail);
+  out.met = tail <= allowed;
+  out.weights = w.replicate(1, probes);
+  const auto factor_u = out.svd.u.leftCols(out.rank);
+  const auto factor_sv = out.svd.sv.topRows(out.rank);
+  const Eigen::VectorXf said = factor_sv * field.cwiseQuotient(w).replicate(1, probes).transpose();
+  out.error2 = left_out + (rest - factor_u * (factor_sv - said * d)).squaredNorm();
   return out;
 }
 
@@ -97,11 +118,11 @@ uint16_t to_unorm16(float irradiance) {
 CellChunk::Cluster quantise(const Truncated& t, std::span<const uint32_t> rows, std::span<const Vec3> positions,
                             int order, std::span<const float> u) {
   const size_t J = static_cast<size_t>(sh_count(order)), stride = static_cast<size_t>(sh_stride(order));
-  const size_t probes = t.block.probes.size(), rank = static_cast<size_t>(t.rank);
+  const size_t probes = t.probes.size(), rank = static_cast<size_t>(t.rank);
   const size_t padded = (rows.size() + 7) / 8 * 8;
   CellChunk::Cluster c;
   c.receivers = static_cast<uint32_t>(rows.size());
-  c.probes = t.block.probes;
+  c.probes = t.probes;
   c.projection.assign(rank * probes * stride, 0);
   c.reconstruction.assign(rank * padded, 0);
   for (size_t k = 0; k < rank; ++k) {
@@ -142,8 +163,7 @@ CompressedCell compress_cell(const Matrix& transport, std::span<const Vec3> posi
     std::vector<uint32_t> rows = std::move(stack.back());
     stack.pop_back();
     const Truncated t = truncate(transport, rows, options, u, hash_combine(options.seed, rows.size()));
-    const double allowed = static_cast<double>(options.threshold) * options.threshold * t.norm2;
-    if (t.error2 > allowed && rows.size() >= 2 * options.min_receivers) {
+    if (!t.met && rows.size() >= 2 * options.min_receivers) {
       // Median split along the longest axis, ties by index.
       Aabb box;
       for (const uint32_t r : rows) box.extend(positions[r]);

@@ -17,6 +17,7 @@ struct CompressionOptions {
   int max_rank = 32;
   float threshold = 0.02f;       ///< relative Frobenius error at which the rank ends
   uint32_t min_receivers = 128;  ///< > 0: a cluster is not split below this many receivers
+  float probe_loss = 0.5f;       ///< share of threshold² that a receiver's squared row may lose to probes left out
   bool weigh_bands = true;       ///< measure errors on T·W
   uint32_t relight_rays = 0;     ///< of the probes: the uniform field that is kept is sh_uniform(order, relight_rays)
   uint64_t seed = 0;

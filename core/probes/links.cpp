@@ -55,7 +55,7 @@ std::vector<ProbeGrid::Near> ProbeGrid::within(Vec3 p, float radius) const {
   std::vector<Near> found;
   for (uint32_t i = 0; i < probes_.size(); ++i) {
     const Vec3 d = probes_[i].position - p;
-    if (radius == 0 || dot(d, d) <= radius * radius) found.push_back({dot(d, d), i});
+    if (dot(d, d) <= radius * radius) found.push_back({dot(d, d), i});
   }
   std::sort(found.begin(), found.end());
   return found;

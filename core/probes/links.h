@@ -28,7 +28,7 @@ class ProbeGrid {
   /// REQUIRES: count > 0; p within 2^30 cells of the origin.
   std::vector<Near> nearest(Vec3 p, int count) const;
 
-  /// All probes within `radius` of p, 0 for no limit, nearest first, ties by index.
+  /// All probes within `radius` of p, nearest first, ties by index.
   std::vector<Near> within(Vec3 p, float radius) const;
 
   /// Probes farther than this many cells are not looked for by nearest(): what lies beyond cannot change a receiver's links.

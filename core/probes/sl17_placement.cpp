@@ -100,7 +100,7 @@ absl::StatusOr<PlacementResult> place_probes_sl17(const RayTracer& tracer, Recei
 }
 
 float support_radius(std::span<const Probe> probes, const Receivers& receivers, int overlap) {
-  if (probes.size() <= static_cast<size_t>(overlap)) return 0;
+  if (probes.empty() || receivers.all.empty()) return 0;
   Aabb box;
   for (const Probe& p : probes) box.extend(p.position);
   for (const Receiver& r : receivers.all) box.extend(r.point.position);
@@ -114,7 +114,7 @@ float support_radius(std::span<const Probe> probes, const Receivers& receivers, 
       ++bins[static_cast<size_t>(share * static_cast<float>(kBins))];
     }
   }
-  const uint64_t wanted = static_cast<uint64_t>(overlap) * receivers.all.size();
+  const uint64_t wanted = std::min(static_cast<uint64_t>(overlap), uint64_t{probes.size()}) * receivers.all.size();
   uint64_t count = 0;
   size_t bin = 0;
   while (bin <= kBins && count < wanted) count += bins[bin++];

@@ -20,8 +20,8 @@ struct Sl17Options {
 absl::StatusOr<PlacementResult> place_probes_sl17(const RayTracer& tracer, Receivers* receivers,
                                                   const Sl17Options& options, const Parallel& parallel);
 
-/// The one radius r of all supports: that at which a receiver lies within r of `overlap` probes on average, to a 65536th
-/// of the longest distance. 0 (no limit: all weigh alike) if there are not more probes than that.
+/// The one radius r of all supports: that at which a receiver lies within r of `overlap` probes on average (of all, if
+/// there are fewer), to a 65536th of the longest distance. 0 if there is no probe or no receiver.
 float support_radius(std::span<const Probe> probes, const Receivers& receivers, int overlap);
 
 }  // namespace lightloom

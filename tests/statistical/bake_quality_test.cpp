@@ -17,12 +17,13 @@ namespace lightloom {
 namespace {
 
 using test::bake_level;
+using test::BakedLevel;
 using test::Device;
 using test::light;
 using test::value_or_die;
 
 /// Area-weighted mean over receivers, channels together.
-double mean(const test::BakedLevel& level, const std::vector<Vec3>& e, auto&& keep) {
+double mean(const BakedLevel& level, const std::vector<Vec3>& e, auto&& keep) {
   double sum = 0, weight = 0;
   for (size_t i = 0; i < e.size(); ++i) {
     const Receiver& r = level.elements.receivers.all[i];
@@ -95,29 +96,37 @@ std::vector<Light> random_lights(const RayTracer& tracer) {
   return lights;
 }
 
+std::unique_ptr<BakedLevel> bake_cornell(BakeParams params, float spacing) {
+  params.spacing = spacing;
+  params.texels_per_metre = 6;
+  return bake_level(value_or_die(builtin_scene("cornell")), params);
+}
+
+ReferenceResult truth_of(const BakedLevel& level, const Light& light) {
+  level.scene->lights = {light};
+  ReferenceOptions options;
+  options.samples = 1600;
+  return value_or_die(reference_lightmap(*level.tracer, level.elements.layout, options));
+}
+
+/// rel_rmse of one bounce of the light.
+double error_of(const BakedLevel& level, const Light& one, const ReferenceResult& truth) {
+  level.scene->lights = {one};
+  return value_or_die(compare(lightmap_image(level.elements, light(level, 1)), truth.image, {})).rel_rmse;
+}
+
 // The bounds are those of an early prototype, with its probes, order and lights.
 TEST(Cornell, EightRandomLights) {
   BakeParams ours, sl17 = sl17_params();
   sl17.probes = 26;
   sl17.relight_rays = ours.relight_rays;
-  for (BakeParams* p : {&ours, &sl17}) {
-    p->spacing = 2.36f;
-    p->texels_per_metre = 6;
-  }
-  const auto level = bake_level(value_or_die(builtin_scene("cornell")), ours);
-  const auto baseline = bake_level(value_or_die(builtin_scene("cornell")), sl17);
+  const auto level = bake_cornell(ours, 2.36f), baseline = bake_cornell(sl17, 2.36f);
   ASSERT_EQ(level->manifest.probes.size(), 26u);
   ASSERT_EQ(baseline->manifest.probes.size(), 26u);
   double log_ours = 0, log_sl17 = 0;
   for (const Light& one : random_lights(*level->tracer)) {
-    level->scene->lights = baseline->scene->lights = {one};
-    ReferenceOptions options;
-    options.samples = 1600;
-    const ReferenceResult truth = value_or_die(reference_lightmap(*level->tracer, level->elements.layout, options));
-    const auto error = [&](const test::BakedLevel& l) {
-      return value_or_die(compare(lightmap_image(l.elements, light(l, 1)), truth.image, {})).rel_rmse;
-    };
-    const double of_ours = error(*level), of_sl17 = error(*baseline);
+    const ReferenceResult truth = truth_of(*level, one);
+    const double of_ours = error_of(*level, one, truth), of_sl17 = error_of(*baseline, one, truth);
     std::printf("light at %.2f %.2f %.2f: rel_rmse %.4f, SL17 %.4f (reference noise %.4f)\n",
                 static_cast<double>(one.position.x), static_cast<double>(one.position.y),
                 static_cast<double>(one.position.z), of_ours, of_sl17, truth.noise);
@@ -129,6 +138,34 @@ TEST(Cornell, EightRandomLights) {
               std::exp(log_sl17 / 8));
   EXPECT_LE(std::exp(log_ours / 8), 0.105);
   EXPECT_LE(std::exp(log_sl17 / 8), 0.12);
+}
+
+// SL17 Figs. 10 and 11: more probes err less; higher orders err less, by less each time.
+TEST(Cornell, Sl17FollowsItsPublishedTrends) {
+  std::vector<Light> lights;
+  std::vector<ReferenceResult> truths;
+  const auto error = [&](int probes, int order) {
+    BakeParams params = sl17_params();
+    params.probes = probes;
+    params.order = order;
+    const auto level = bake_cornell(params, 2.36f);
+    if (lights.empty()) {
+      lights = random_lights(*level->tracer);
+      lights.resize(4);
+      for (const Light& one : lights) truths.push_back(truth_of(*level, one));
+    }
+    double log_error = 0;
+    for (size_t i = 0; i < lights.size(); ++i) log_error += std::log(error_of(*level, lights[i], truths[i]));
+    const double mean = std::exp(log_error / static_cast<double>(lights.size()));
+    std::printf("%d probes, order %d: geometric mean rel_rmse %.4f\n", probes, order, mean);
+    return mean;
+  };
+  const double of_26 = error(26, 7);
+  const double by_probes[] = {error(2, 7), error(8, 7), of_26, error(100, 7)};
+  for (size_t i = 1; i < 4; ++i) EXPECT_LT(by_probes[i], by_probes[i - 1]);
+  const double by_order[] = {error(26, 1), error(26, 3), error(26, 5), of_26};
+  for (size_t i = 1; i < 4; ++i) EXPECT_LT(by_order[i], by_order[i - 1]);
+  EXPECT_LT(by_order[2] - by_order[3], 0.5 * (by_order[0] - by_order[1]));
 }
 
 TEST(Vulkan, SameLightAsTheDecoder) {

@@ -257,6 +257,22 @@ TEST(CompressCell, ClustersKeepOnlyTheProbesTheyUse) {
   }
 }
 
+TEST(CompressCell, ProbesThatSayLittleAreLeftOut) {
+  // All receivers read probe 0 well, probe 1 hardly, and probe 2 hardly but for one receiver.
+  Level level = strip(200, 3, 0.2f, 11);
+  level.transport.leftCols(kJ).rowwise() = Eigen::RowVectorXf(level.transport.row(0).head(kJ));
+  level.transport.middleCols(kJ, kJ) *= 1e-3f;
+  level.transport.block(1, 2 * kJ, 199, kJ) *= 1e-3f;
+  level.transport.block(0, 2 * kJ, 1, kJ) = level.transport.block(0, 0, 1, kJ);
+  CompressionOptions o = options(64, 0.02f);
+  const CompressedCell cell = compress_cell(level.transport, level.positions, o);
+  ASSERT_EQ(cell.clusters.size(), 1u);
+  EXPECT_EQ(cell.clusters[0].probes, (std::vector<uint32_t>{0, 2})) << "one receiver needs probe 2";
+  EXPECT_LE(cell.error, 0.0201);
+  o.probe_loss = 0;
+  EXPECT_EQ(compress_cell(level.transport, level.positions, o).clusters[0].probes, (std::vector<uint32_t>{0, 1, 2}));
+}
+
 TEST(CompressCell, PaddingIsZero) {
   const Level level = strip(13, 3, 0.5f, 11);
   CompressionOptions o = options(4, 0.001f);

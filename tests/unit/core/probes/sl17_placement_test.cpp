@@ -93,7 +93,9 @@ TEST(Sl17Placement, RadiusCoversReceiversByTheOverlapOnAverage) {
     EXPECT_NEAR(links / static_cast<double>(level.receivers.all.size()), overlap, 0.02 * overlap);
   }
   const auto few = value_or_die(place_probes_sl17(*level.tracer, &level.receivers, {0.9f, 5, 10}, {}));
-  EXPECT_EQ(few.radius, 0);
+  const ProbeGrid grid(few.probes, 0.9f);
+  for (const Receiver& r : level.receivers.all) EXPECT_EQ(grid.within(r.point.position, few.radius).size(), 5u);
+  EXPECT_LT(few.radius, length(level.scene.bounds().size()));
 }
 
 TEST(Sl17Placement, TooFineASpacingIsAnError) {
