@@ -91,7 +91,7 @@ absl::StatusOr<BakeReport> bake(const RayTracer& tracer, const BakeParams& param
   }
   bool done = parallel_for(cells.size(), cell_stage, [&](uint64_t i) {
     if (writer.failed()) return;
-    cells[i] = bake_cell(tracer, cache ? &*cache : nullptr, make_cell_task(plan, scene, plan.cells[i]));
+    cells[i] = bake_cell(tracer, cache ? &*cache : nullptr, make_cell_task(plan, tracer, plan.cells[i]));
     rays += cells[i].stats.gather_rays + cells[i].stats.visibility_rays;
     cell_refs[i] = writer.put(encode_cell(cells[i].chunk));
   });

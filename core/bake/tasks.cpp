@@ -7,6 +7,7 @@
 #include "core/base/stopwatch.h"
 #include "core/compression/clusters.h"
 #include "core/probes/links.h"
+#include "core/receivers/texel_opening.h"
 
 namespace lightloom {
 namespace {
@@ -27,7 +28,8 @@ std::map<Id, uint32_t> enumerate(std::vector<Id> ids) {
 
 }  // namespace
 
-CellTask make_cell_task(const Plan& plan, const Scene& scene, const PlannedCell& cell) {
+CellTask make_cell_task(const Plan& plan, const RayTracer& tracer, const PlannedCell& cell) {
+  const Scene& scene = tracer.scene();
   CellTask task;
   task.params = plan.params;
   task.seed = hash_combine(plan.params.seed, static_cast<uint64_t>(static_cast<uint32_t>(cell.level)));
@@ -67,6 +69,14 @@ CellTask make_cell_task(const Plan& plan, const Scene& scene, const PlannedCell&
     const Receiver& r = plan.receivers.all[cell.receivers[i]];
     GatherPoint point;
     point.point = r.point;
+    if (sl17) {
+      point.from = {r.point};
+    } else {
+      const TexelGrid& grid = plan.receivers.grids[r.object];
+      point.from = TexelOpening(tracer, scene.objects[r.object], plan.layout.uv[r.object], grid, grid.texels[r.texel],
+                                r.back, r.seed)
+                       .points();
+    }
     point.seed = hash_combine(r.seed, plan.params.seed);
     for (const auto& n : near[i]) point.near.push_back(probe_slot.at(n.probe));
     // SL17: one radius for all. Else the k nearest, and the distance to the next one: local, and continuous in x.

@@ -4,6 +4,7 @@
 #include <array>
 
 #include "core/receivers/open_space.h"
+#include "core/receivers/texel_opening.h"
 
 namespace lightloom {
 
@@ -55,8 +56,8 @@ absl::StatusOr<Receivers> find_receivers(const RayTracer& tracer, const AtlasLay
       r.texel = items[i].texel;
       r.back = side == 1;
       r.key = (side * static_cast<uint32_t>(grid.height) + texel.y) * static_cast<uint32_t>(grid.width) + texel.x;
-      r.point = shading_point(object, texel.triangle, texel.b1, texel.b2, r.back);
       r.seed = hash_combine(object.id.low64(), r.key);
+      r.point = TexelOpening(tracer, object, layout.uv[r.object], grid, texel, r.back, r.seed).middle();
       sides[i].space[side] = classify(tracer, r.point, r.seed);
     }
   });

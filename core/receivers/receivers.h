@@ -18,8 +18,8 @@ struct Receiver {
   uint32_t key = 0;
   uint32_t texel = 0;  ///< index into the object's TexelGrid::texels
   bool back = false;
-  ShadingPoint point;
-  uint64_t seed = 0;  ///< of (object id, key): all randomness of this receiver comes from here
+  ShadingPoint point;  ///< TexelOpening::middle()
+  uint64_t seed = 0;   ///< of (object id, key): all randomness of this receiver comes from here
 };
 
 struct Receivers {

@@ -21,6 +21,12 @@ float resolution(Vec3 to_probe, Vec3 psi, Vec3 normal) {
 
 }  // namespace
 
+GatherRay gather_ray(const GatherPoint& receiver, uint32_t r, Strata strata, Rng* rng) {
+  const Sample2 uv = stratified(r, strata, rng);
+  const ShadingPoint& from = receiver.from[(r % strata.columns + r / strata.columns) % receiver.from.size()];
+  return {from.position, leave(from, square_to_cosine_hemisphere(uv.u, uv.v))};
+}
+
 GatherStats& GatherStats::operator+=(const GatherStats& o) {
   gather_rays += o.gather_rays;
   visibility_rays += o.visibility_rays;
@@ -31,11 +37,11 @@ GatherStats& GatherStats::operator+=(const GatherStats& o) {
 Gatherer::Gatherer(const RayTracer& tracer, VisibilityCache* cache, GatherProbes probes, const GatherOptions& options)
     : tracer_(tracer), cache_(cache), probes_(probes), options_(options), accumulator_(options.order) {}
 
-Gatherer::Sample Gatherer::shoot(const ShadingPoint& from, Vec3 direction) {
+Gatherer::Sample Gatherer::shoot(const GatherRay& ray) {
   ++stats_.gather_rays;
-  const Hit hit = tracer_.closest(from.position, direction);
+  const Hit hit = tracer_.closest(ray.origin, ray.direction);
   Sample s;
-  s.direction = direction;
+  s.direction = ray.direction;
   if (!hit) {
     s.kind = Sample::kSky;
     return s;
@@ -72,7 +78,8 @@ bool Gatherer::sees(uint32_t probe, const Sample& s, Vec3* psi) {
 
 GatherStats Gatherer::add_row(const GatherPoint& receiver, std::span<float> row) {
   const size_t J = static_cast<size_t>(sh_count(options_.order));
-  LL_CHECK(row.size() == probes_.positions.size() * J && receiver.links <= receiver.near.size());
+  LL_CHECK(!receiver.from.empty() && row.size() == probes_.positions.size() * J &&
+           receiver.links <= receiver.near.size());
   stats_ = {};
 
   // Spatial weights w_i(x) (Eq. 10).
@@ -88,8 +95,7 @@ GatherStats Gatherer::add_row(const GatherPoint& receiver, std::span<float> row)
   Rng rng(receiver.seed);
   samples_.clear();
   for (uint32_t r = 0; r < rays; ++r) {
-    const Sample2 uv = stratified(r, strata, &rng);
-    samples_.push_back(shoot(receiver.point, leave(receiver.point, square_to_cosine_hemisphere(uv.u, uv.v))));
+    samples_.push_back(shoot(gather_ray(receiver, r, strata, &rng)));
   }
 
   // K_ij = w_i·V_i·Y_j(ψ_i) ÷ Σ_k w_k·V_k (Eq. 4), the weights w_i(x) perhaps times resolution.

@@ -10,6 +10,7 @@
 #include <span>
 #include <vector>
 
+#include "core/base/sampling.h"
 #include "core/base/vec.h"
 #include "core/receivers/surface_point.h"
 #include "core/scene/ray_tracer.h"
@@ -27,12 +28,21 @@ struct GatherOptions {
 
 /// A receiver and the probes it may read, nearest first.
 struct GatherPoint {
-  ShadingPoint point;
+  ShadingPoint point;              ///< where it is: what weights are of
+  std::vector<ShadingPoint> from;  ///< where rays start, spread over what the receiver stands for; at least one
   uint64_t seed = 0;
   std::vector<uint32_t> near;  ///< indices into the cell's probes: links, then fallbacks for what no link sees
   uint32_t links = 0;          ///< how many of `near` are blended
   float radius = 0;            ///< r of w(|x − p|/r), metres; 0: all links weigh alike
 };
+
+/// Gather ray r of a receiver: where it starts, and its unit direction. Rays are stratified over directions, and those of
+/// one starting point are spread over them too (a Latin square). `rng` is seeded with the receiver's seed, and rays are
+/// asked for in order.
+struct GatherRay {
+  Vec3 origin, direction;
+};
+GatherRay gather_ray(const GatherPoint& receiver, uint32_t r, Strata strata, Rng* rng);
 
 /// Counts over many receivers.
 struct GatherStats {
@@ -74,7 +84,7 @@ class Gatherer {
     Vec3 psi;          ///< ψ_i(ω), unit
   };
 
-  Sample shoot(const ShadingPoint& from, Vec3 direction);
+  Sample shoot(const GatherRay& ray);
   bool sees(uint32_t probe, const Sample& sample, Vec3* psi);
 
   const RayTracer& tracer_;

@@ -85,16 +85,17 @@ int run(int argc, char** argv) {
   const BareEmbree bare(scene);
   const Strata strata = strata_of(static_cast<uint32_t>(plan.params.rays));
   std::atomic<uint64_t> hits{0};
+  std::vector<CellTask> tasks(plan.cells.size());
+  parallel_for(tasks.size(), {}, [&](uint64_t i) { tasks[i] = make_cell_task(plan, *tracer, plan.cells[i]); });
   const auto bare_seconds = [&] {
     const Stopwatch watch;
-    parallel_for(plan.cells.size(), {}, [&](uint64_t i) {
+    parallel_for(tasks.size(), {}, [&](uint64_t i) {
       uint64_t found = 0;
-      for (const uint32_t r : plan.cells[i].receivers) {
-        const Receiver& receiver = plan.receivers.all[r];
-        Rng rng(hash_combine(receiver.seed, plan.params.seed));
-        for (uint32_t k = 0; k < strata.columns * strata.rows; ++k) {
-          const Sample2 uv = stratified(k, strata, &rng);
-          found += bare.hits(receiver.point.position, leave(receiver.point, square_to_cosine_hemisphere(uv.u, uv.v)));
+      for (const GatherPoint& receiver : tasks[i].receivers) {
+        Rng rng(receiver.seed);
+        for (uint32_t r = 0; r < strata.columns * strata.rows; ++r) {
+          const GatherRay ray = gather_ray(receiver, r, strata, &rng);
+          found += bare.hits(ray.origin, ray.direction);
         }
       }
       hits += found;
@@ -106,10 +107,10 @@ int run(int argc, char** argv) {
   std::vector<Vec3> probes;
   for (const Probe& p : plan.placement.probes) probes.push_back(p.position);
   VisibilityCache cache(*tracer, plan.layout, plan.receivers.grids, probes);
-  std::vector<GatherStats> stats(plan.cells.size());
+  std::vector<GatherStats> stats(tasks.size());
   const Stopwatch watch;
   parallel_for(plan.cells.size(), {}, [&](uint64_t i) {
-    const CellTask task = make_cell_task(plan, scene, plan.cells[i]);
+    const CellTask task = make_cell_task(plan, *tracer, plan.cells[i]);
     Gatherer gatherer(*tracer, cached ? &cache : nullptr, {task.probes, task.probe_ids},
                       {params.order, plan.params.rays, !sl17});
     std::vector<float> row(task.probes.size() * static_cast<size_t>(sh_count(params.order)));

@@ -27,6 +27,7 @@ struct GatherLevel {
   GatherPoint point(uint32_t receiver, uint32_t links, float radius) const {
     GatherPoint p;
     p.point = receivers.all[receiver].point;
+    p.from = {p.point, receivers.all[(receiver + 1) % receivers.all.size()].point};
     p.seed = receivers.all[receiver].seed;
     p.near = ids;
     p.links = links;

@@ -25,6 +25,25 @@ std::vector<float> row_of(const GatherLevel& level, VisibilityCache* cache, cons
   return row;
 }
 
+TEST(Gather, RaysOfOneStartAreSpreadOverDirections) {
+  GatherPoint x;
+  for (int i = 0; i < 16; ++i) {
+    x.from.push_back({});
+    x.from.back().position = {static_cast<float>(i), 0, 0};
+    x.from.back().normal = x.from.back().geometric = {0, 1, 0};
+  }
+  const Strata strata{16, 16};
+  Rng rng(1);
+  std::vector<std::set<int>> heights(16);
+  for (uint32_t r = 0; r < 256; ++r) {
+    const GatherRay ray = gather_ray(x, r, strata, &rng);
+    EXPECT_GT(ray.direction.y, 0);
+    // cos²θ is uniform; each start has one ray in each sixteenth of it, or its neighbour in the mapping of the square.
+    heights[static_cast<size_t>(ray.origin.x)].insert(static_cast<int>(16 * ray.direction.y * ray.direction.y));
+  }
+  for (const auto& h : heights) EXPECT_GE(h.size(), 8u);
+}
+
 /// SL17 Eqs. 4 and 7 as they stand, ray by ray, in double.
 std::vector<double> row_by_the_book(const GatherLevel& level, const GatherPoint& x, const GatherOptions& options) {
   const size_t J = static_cast<size_t>(sh_count(options.order));
@@ -32,9 +51,8 @@ std::vector<double> row_by_the_book(const GatherLevel& level, const GatherPoint&
   const Strata strata = strata_of(static_cast<uint32_t>(options.rays));
   Rng rng(x.seed);
   for (uint32_t r = 0; r < static_cast<uint32_t>(options.rays); ++r) {
-    const Sample2 uv = stratified(r, strata, &rng);
-    const Vec3 omega = leave(x.point, square_to_cosine_hemisphere(uv.u, uv.v));
-    const Hit hit = level.tracer->closest(x.point.position, omega);
+    const auto [origin, omega] = gather_ray(x, r, strata, &rng);
+    const Hit hit = level.tracer->closest(origin, omega);
     ShadingPoint y;
     if (hit) {
       const Object& object = level.scene.objects[hit.object];
