@@ -1,0 +1,125 @@
+#include "bake-server/scheduler/decide.h"
+
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <set>
+#include <tuple>
+
+namespace lightloom {
+namespace {
+
+class Deciding {
+ public:
+  Deciding(std::vector<JobView> jobs, int64_t now_ms, const DecideOptions& options)
+      : jobs_(std::move(jobs)), now_ms_(now_ms), options_(options) {
+    for (const JobView& job : jobs_) {
+      for (const LeasedView& task : job.leased) {
+        out_of_client_[job.client] += task.workers.size();
+        out_of_job_[job.job] += task.workers.size();
+        for (const std::string& worker : task.workers) runs_[job.job].insert({run_of(task.order), worker});
+      }
+    }
+  }
+
+  std::optional<Decision> next(const Demand& demand) {
+    if (auto decision = fresh(demand)) return decision;
+    return straggler(demand);
+  }
+
+ private:
+  int64_t run_of(int64_t order) const {
+    const int64_t run = order / options_.run;
+    return order % options_.run < 0 ? run - 1 : run;
+  }
+
+  Decision give(JobView* job, int64_t task, int64_t order, const std::string& worker) {
+    ++out_of_client_[job->client];
+    ++out_of_job_[job->job];
+    runs_[job->job].insert({run_of(order), worker});
+    return {job->job, task, order, worker};
+  }
+
+  std::optional<Decision> fresh(const Demand& demand) {
+    JobView* best = nullptr;
+    const auto rank = [&](const JobView& job) {
+      return std::tuple(-static_cast<int64_t>(job.priority), out_of_client_[job.client], out_of_job_[job.job], job.job);
+    };
+    for (JobView& job : jobs_) {
+      if (!job.ready.empty() && (best == nullptr || rank(job) < rank(*best))) best = &job;
+    }
+    if (best == nullptr) return std::nullopt;
+
+    const auto chosen = choose(*best, demand);
+    const TaskView task = *chosen;
+    best->ready.erase(chosen);
+    best->leased.push_back({task.task, task.order, {demand.worker}, now_ms_});
+    return give(best, task.task, task.order, demand.worker);
+  }
+
+  std::vector<TaskView>::const_iterator choose(const JobView& job, const Demand& demand) {
+    const auto& runs = runs_[job.job];
+    const auto first_that = [&](const auto& fits) { return std::find_if(job.ready.begin(), job.ready.end(), fits); };
+    if (demand.last_job == job.job) {
+      const auto own = first_that([&](const TaskView& t) { return run_of(t.order) == run_of(demand.last_order); });
+      if (own != job.ready.end()) return own;
+    }
+    const auto free = first_that([&](const TaskView& t) {
+      const auto at = runs.lower_bound({run_of(t.order), std::string()});
+      return at == runs.end() || at->first != run_of(t.order);
+    });
+    return free != job.ready.end() ? free : job.ready.begin();
+  }
+
+  std::optional<Decision> straggler(const Demand& demand) {
+    JobView* of = nullptr;
+    LeasedView* oldest = nullptr;
+    for (JobView& job : jobs_) {
+      for (LeasedView& task : job.leased) {
+        if (task.workers.size() != 1 || task.workers.front() == demand.worker) continue;
+        if (now_ms_ - task.oldest_ms < options_.straggler_ms) continue;
+        if (oldest == nullptr || std::pair(task.oldest_ms, task.task) < std::pair(oldest->oldest_ms, oldest->task)) {
+          of = &job, oldest = &task;
+        }
+      }
+    }
+    if (oldest == nullptr) return std::nullopt;
+    oldest->workers.push_back(demand.worker);
+    return give(of, oldest->task, oldest->order, demand.worker);
+  }
+
+  std::vector<JobView> jobs_;
+  int64_t now_ms_;
+  DecideOptions options_;
+  std::map<std::string, uint64_t> out_of_client_;
+  std::map<int64_t, uint64_t> out_of_job_;
+  std::map<int64_t, std::set<std::pair<int64_t, std::string>>> runs_;  // per job: runs that workers are in
+};
+
+}  // namespace
+
+std::vector<Decision> decide(std::vector<JobView> jobs, std::vector<Demand> demands, int64_t now_ms,
+                             const DecideOptions& options) {
+  Deciding deciding(std::move(jobs), now_ms, options);
+  std::vector<Decision> out;
+  // In turns, so that a worker with many threads does not take all.
+  for (bool gave = true; gave;) {
+    gave = false;
+    for (Demand& demand : demands) {
+      if (demand.room == 0) continue;
+      const auto decision = deciding.next(demand);
+      if (!decision) {
+        demand.room = 0;
+        continue;
+      }
+      --demand.room;
+      demand.last_job = decision->job;
+      demand.last_order = decision->order;
+      out.push_back(*decision);
+      gave = true;
+    }
+  }
+  return out;
+}
+
+}  // namespace lightloom

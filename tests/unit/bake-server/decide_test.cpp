@@ -1,0 +1,96 @@
+#include "bake-server/scheduler/decide.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <map>
+#include <set>
+
+namespace lightloom {
+namespace {
+
+using ::testing::ElementsAre;
+
+JobView job(int64_t id, int tasks, const std::string& client = "a", int priority = 0) {
+  JobView out{id, client, priority, {}, {}};
+  for (int i = 0; i < tasks; ++i) out.ready.push_back({1000 * id + i, i});
+  return out;
+}
+std::vector<int64_t> orders(const std::vector<Decision>& decisions, const std::string& worker) {
+  std::vector<int64_t> out;
+  for (const Decision& d : decisions) {
+    if (d.worker == worker) out.push_back(d.order);
+  }
+  return out;
+}
+std::map<int64_t, int> per_job(const std::vector<Decision>& decisions) {
+  std::map<int64_t, int> out;
+  for (const Decision& d : decisions) ++out[d.job];
+  return out;
+}
+
+TEST(Decide, NothingToDoOrNobodyThere) {
+  EXPECT_TRUE(decide({}, {{"w", 4}}, 0).empty());
+  EXPECT_TRUE(decide({job(1, 3)}, {}, 0).empty());
+  EXPECT_TRUE(decide({job(1, 3)}, {{"w", 0}}, 0).empty());
+}
+
+TEST(Decide, NoTaskTwiceAndRoomIsKept) {
+  const auto decisions = decide({job(1, 20), job(2, 20)}, {{"v", 7}, {"w", 5}}, 0);
+  std::set<int64_t> tasks;
+  for (const Decision& d : decisions) tasks.insert(d.task);
+  EXPECT_EQ(tasks.size(), 12u);
+  EXPECT_EQ(orders(decisions, "v").size(), 7u);
+  EXPECT_EQ(orders(decisions, "w").size(), 5u);
+}
+
+TEST(Decide, AnUrgentJobComesFirst) {
+  const auto decisions = decide({job(1, 100), job(2, 10, "a", 5)}, {{"w", 12}}, 0);
+  ASSERT_EQ(decisions.size(), 12u);
+  for (int i = 0; i < 10; ++i) EXPECT_EQ(decisions[static_cast<size_t>(i)].job, 2);
+  EXPECT_EQ(decisions[10].job, 1);
+}
+
+TEST(Decide, ClientsShareEvenlyHoweverManyJobsTheyHave) {
+  const auto decisions = decide({job(1, 50, "a"), job(2, 50, "a"), job(3, 50, "a"), job(4, 50, "b")}, {{"w", 12}}, 0);
+  const auto n = per_job(decisions);
+  EXPECT_EQ(n.at(4), 6);
+  EXPECT_EQ(n.at(1), 2);
+  EXPECT_EQ(n.at(2), 2);
+  EXPECT_EQ(n.at(3), 2);
+}
+
+TEST(Decide, WhatIsOutCountsForTheShare) {
+  JobView first = job(1, 10, "a");
+  for (int i = 0; i < 4; ++i) first.leased.push_back({500 + i, 100 + i, {"v"}, 0});
+  EXPECT_EQ(per_job(decide({first, job(2, 10, "b")}, {{"w", 4}}, 0)).at(2), 4);
+}
+
+TEST(Decide, WorkersStayInRunsOfTheirOwn) {
+  DecideOptions options;
+  options.run = 4;
+  const auto decisions = decide({job(1, 40)}, {{"v", 6}, {"w", 6}}, 0, options);
+  EXPECT_THAT(orders(decisions, "v"), ElementsAre(0, 1, 2, 3, 8, 9));
+  EXPECT_THAT(orders(decisions, "w"), ElementsAre(4, 5, 6, 7, 12, 13));
+  // One that comes back goes on where it was.
+  JobView later = job(1, 0);
+  for (int i = 0; i < 8; ++i) later.ready.push_back({i, 20 + i});
+  EXPECT_THAT(orders(decide({later}, {{"w", 2, 1, 25}}, 0, options), "w"), ElementsAre(24, 25));
+}
+
+TEST(Decide, StragglersAreLeasedOnceMoreWhenNothingElseIsLeft) {
+  JobView end = job(1, 0);
+  end.leased = {{7, 0, {"v"}, 5'000}, {8, 1, {"v"}, 1'000}, {9, 2, {"u", "v"}, 0}, {10, 3, {"w"}, 0}};
+  DecideOptions options;
+  options.straggler_ms = 60'000;
+  EXPECT_TRUE(decide({end}, {{"w", 4}}, 60'000, options).empty());
+  const auto decisions = decide({end}, {{"w", 4}}, 66'000, options);
+  ASSERT_EQ(decisions.size(), 2u) << "not its own, and none a third time";
+  EXPECT_EQ(decisions[0].task, 8) << "the oldest first";
+  EXPECT_EQ(decisions[1].task, 7);
+  end.ready.push_back({11, 4});
+  EXPECT_EQ(decide({end}, {{"w", 1}}, 66'000, options).front().task, 11);
+}
+
+}  // namespace
+}  // namespace lightloom
