@@ -20,12 +20,6 @@ Introduction introduce_this_machine(uint32_t threads) {
           .threads = threads};
 }
 
-std::shared_ptr<grpc::Channel> dial(const std::string& address) {
-  grpc::ChannelArguments arguments;
-  arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
-  return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
-}
-
 absl::StatusOr<std::string> join(const std::shared_ptr<grpc::Channel>& channel, const Introduction& self,
                                  std::chrono::milliseconds deadline) {
   v1::JoinRequest request;

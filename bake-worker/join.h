@@ -26,10 +26,6 @@ struct Introduction {
 /// This program on this machine, with `threads` threads.
 Introduction introduce_this_machine(uint32_t threads);
 
-/// A connection to the server at `address` (HOST:PORT), made when first used. Not encrypted; ignores HTTP
-/// proxies.
-std::shared_ptr<grpc::Channel> dial(const std::string& address);
-
 /// Joins, waiting at most `deadline` for the server to be there and to answer. Returns the server's release.
 /// Errors: FailedPrecondition with the server's reason if it refuses (asking again cannot help); else
 /// Unavailable.

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <memory>
 
+#include "cli/bake_options.h"
 #include "cli/command.h"
 #include "cli/files.h"
 #include "cli/interrupt.h"
@@ -19,10 +20,8 @@ namespace lightloom {
 namespace {
 
 struct Options {
-  std::string scene, output, method = "default";
-  BakeParams params;
-  int links = -1, relight_rays = -1;  // −1: the method's
-  float threshold = -1;
+  std::string scene, output;
+  BakeOptions how;
   int threads = 0;
   bool json = false;
 };
@@ -82,21 +81,11 @@ void print(const std::string& output, const BakeReport& r) {
               r.rays_gather > 0 ? 100.0 * static_cast<double>(r.unseen) / static_cast<double>(r.rays_gather) : 0.0);
 }
 
-absl::Status check(Options* options) {
-  const Options& o = *options;
-  if (o.method != "default" && o.method != "sl17") {
-    return absl::InvalidArgumentError("--method must be default or sl17");
-  }
-  const BakeParams of_method = o.method == "sl17" ? sl17_params() : BakeParams{};
-  BakeParams& p = options->params;
-  p.method = of_method.method;
-  p.links = o.links == -1 ? of_method.links : o.links;
-  p.relight_rays = o.relight_rays == -1 ? of_method.relight_rays : o.relight_rays;
-  p.threshold = o.threshold == -1 ? of_method.threshold : o.threshold;
-  LL_RETURN_IF_ERROR(check_params(o.params));
-  LL_RETURN_IF_ERROR(check_threads(o.threads));
-  LL_RETURN_IF_ERROR(check_input(o.scene));
-  return OutputCheck({o.scene}).loom("-o", o.output);
+absl::Status check(Options* o) {
+  LL_RETURN_IF_ERROR(o->how.check());
+  LL_RETURN_IF_ERROR(check_threads(o->threads));
+  LL_RETURN_IF_ERROR(check_input(o->scene));
+  return OutputCheck({o->scene}).loom("-o", o->output);
 }
 
 absl::Status run(const Options& o) {
@@ -109,7 +98,7 @@ absl::Status run(const Options& o) {
   control.progress = [&](const std::string& stage, uint64_t done, uint64_t total, uint64_t rays) {
     bar.update(stage, done, total, rays);
   };
-  LL_ASSIGN_OR_RETURN(const BakeReport report, bake(*level.tracer, o.params, o.output, control));
+  LL_ASSIGN_OR_RETURN(const BakeReport report, bake(*level.tracer, o.how.params, o.output, control));
   bar.finish();
   if (o.json) {
     print_json(to_json(report));
@@ -123,27 +112,12 @@ absl::Status run(const Options& o) {
 
 Command bake_command() {
   const auto o = std::make_shared<Options>();
-  BakeParams& p = o->params;
-  return {"bake",
-          "Bake a level into a .loom asset",
-          {{"SCENE", "level, .glb or .gltf", &o->scene, true},
-           {"-o,--output", "OUT.loom, a folder", &o->output, true},
-           {"--method", "default, or sl17: Silvennoinen & Lehtinen 2017 as published, to compare with", &o->method},
-           {"--spacing", "side of a probe cell, metres; 0: chosen from the level", &p.spacing},
-           {"--order", "spherical harmonics order of the probes, 0 to 9", &p.order},
-           {"--probes", "sl17: how many, instead of by --spacing; 0: by --spacing", &p.probes},
-           {"--links", "probes that each receiver reads; −1: 6 (sl17: 10 on average)", &o->links},
-           {"--rays", "gather rays per receiver, rounded up to a × b with a ≤ b ≤ 2a", &p.rays},
-           {"--relight-rays", "rays of each probe at run time; −1: 4096 (sl17: 8000)", &o->relight_rays},
-           {"--max-rank", "most coefficients of a cluster", &p.max_rank},
-           {"--threshold", "relative error at which a cluster's rank ends; −1: 0.02 (sl17: 0.005)", &o->threshold},
-           {"--cell-receivers", "a bake cell holds fewer receivers than this", &p.cell_receivers},
-           {"--texels-per-metre", "lightmap density; 0: chosen from the level", &p.texels_per_metre},
-           {"--lightmap-size", "side of the scene atlas, texels; 0: from the density", &p.lightmap_size},
-           {"--seed", "of all random numbers", &p.seed},
-           {"--threads", "0: one per hardware thread", &o->threads},
-           {"--json", "print the report as JSON", &o->json}},
-          [o] { return check(o.get()); },
+  std::vector<Option> options = {{"SCENE", "level, .glb or .gltf", &o->scene, true},
+                                 {"-o,--output", "OUT.loom, a folder", &o->output, true}};
+  for (Option& option : o->how.options()) options.push_back(std::move(option));
+  options.push_back({"--threads", "0: one per hardware thread", &o->threads});
+  options.push_back({"--json", "print the report as JSON", &o->json});
+  return {"bake", "Bake a level into a .loom asset", std::move(options), [o] { return check(o.get()); },
           [o] { return run(*o); }};
 }
 

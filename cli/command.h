@@ -32,12 +32,19 @@ struct Command {
 };
 
 Command bake_command();
+Command cancel_command();
 Command compare_command();
+Command events_command();
+Command fetch_command();
 Command inspect_command();
+Command list_command();
 Command make_scene_command();
 Command reference_command();
 Command render_command();
+Command submit_command();
 Command verify_command();
+Command watch_command();
+Command workers_command();
 
 /// Shared by the commands that have the option.
 absl::Status check_threads(int threads);

@@ -42,8 +42,7 @@ absl::StatusOr<std::vector<uint8_t>> read_at(const File& file, const fs::path& p
   std::vector<uint8_t> out(most);
   size_t done = 0;
   while (done < out.size()) {
-    const ssize_t n =
-        ::pread(file.get(), out.data() + done, out.size() - done, static_cast<off_t>(offset + done));
+    const ssize_t n = ::pread(file.get(), out.data() + done, out.size() - done, static_cast<off_t>(offset + done));
     if (n < 0 && errno == EINTR) continue;
     if (n < 0) return failed(path, "read");
     if (n == 0) break;
@@ -70,8 +69,7 @@ absl::Status write_at(const fs::path& path, uint64_t offset, std::span<const uin
   if (!file.is_open()) return failed(path, "open");
   size_t done = 0;
   while (done < data.size()) {
-    const ssize_t n =
-        ::pwrite(file.get(), data.data() + done, data.size() - done, static_cast<off_t>(offset + done));
+    const ssize_t n = ::pwrite(file.get(), data.data() + done, data.size() - done, static_cast<off_t>(offset + done));
     if (n < 0 && errno == EINTR) continue;
     if (n < 0) return failed(path, "write");
     done += static_cast<size_t>(n);
@@ -147,8 +145,8 @@ absl::Status BlobStore::append(const Digest& digest, uint64_t size, uint64_t off
     fs::remove(part(digest), ignored);
   }
   if (uploaded(digest) != offset) {
-    return absl::AbortedError("the upload of blob " + digest.hex() + " is at byte " +
-                              std::to_string(uploaded(digest)) + "; go on there");
+    return absl::AbortedError("the upload of blob " + digest.hex() + " is at byte " + std::to_string(uploaded(digest)) +
+                              "; go on there");
   }
   LL_RETURN_IF_ERROR(write_at(part(digest), offset, data));
   if (offset + data.size() < size) return absl::OkStatus();

@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 
+#include "bake-server/farm.h"
 #include "bake-server/scheduler/admission.h"
 #include "core/base/status.h"
 
@@ -13,12 +14,12 @@ class Channel;
 
 namespace lightloom {
 
-/// A running server: JobService, WorkerService and gRPC's standard health service. Thread-safe.
+/// A running server: JobService, WorkerService, BlobService and gRPC's standard health service. Thread-safe.
 class Server {
  public:
   /// Listens on `address` (see check_listen_address; port 0 takes a free one), serves until destroyed.
-  /// Errors: a bad address, a port in use.
-  static absl::StatusOr<std::unique_ptr<Server>> start(const std::string& address, const ServerInfo& info);
+  /// Errors: a bad address, a port in use. `farm` must outlive the server, whose end stops its coordinator.
+  static absl::StatusOr<std::unique_ptr<Server>> start(const std::string& address, const ServerInfo& info, Farm* farm);
 
   /// Calls that still run get a second to end, then they are cancelled.
   ~Server();

@@ -14,10 +14,10 @@ class Deciding {
   Deciding(std::vector<JobView> jobs, int64_t now_ms, const DecideOptions& options)
       : jobs_(std::move(jobs)), now_ms_(now_ms), options_(options) {
     for (const JobView& job : jobs_) {
-      for (const LeasedView& task : job.leased) {
-        out_of_client_[job.client] += task.workers.size();
-        out_of_job_[job.job] += task.workers.size();
-        for (const std::string& worker : task.workers) runs_[job.job].insert({run_of(task.order), worker});
+      out_of_client_[job.client] += job.live;
+      out_of_job_[job.id] += job.live;
+      for (const JobView::Running& task : job.running) {
+        for (const std::string& worker : task.workers) runs_[job.id].insert({run_of(task.order), worker});
       }
     }
   }
@@ -33,17 +33,17 @@ class Deciding {
     return order % options_.run < 0 ? run - 1 : run;
   }
 
-  Decision give(JobView* job, int64_t task, int64_t order, const std::string& worker) {
+  Decision give(JobView* job, TaskId task, int64_t order, const std::string& worker) {
     ++out_of_client_[job->client];
-    ++out_of_job_[job->job];
-    runs_[job->job].insert({run_of(order), worker});
-    return {job->job, task, order, worker};
+    ++out_of_job_[job->id];
+    runs_[job->id].insert({run_of(order), worker});
+    return {job->id, task, order, worker};
   }
 
   std::optional<Decision> fresh(const Demand& demand) {
     JobView* best = nullptr;
     const auto rank = [&](const JobView& job) {
-      return std::tuple(-static_cast<int64_t>(job.priority), out_of_client_[job.client], out_of_job_[job.job], job.job);
+      return std::tuple(-static_cast<int64_t>(job.priority), out_of_client_[job.client], out_of_job_[job.id], job.id);
     };
     for (JobView& job : jobs_) {
       if (!job.ready.empty() && (best == nullptr || rank(job) < rank(*best))) best = &job;
@@ -51,20 +51,21 @@ class Deciding {
     if (best == nullptr) return std::nullopt;
 
     const auto chosen = choose(*best, demand);
-    const TaskView task = *chosen;
+    const JobView::Ready task = *chosen;
     best->ready.erase(chosen);
-    best->leased.push_back({task.task, task.order, {demand.worker}, now_ms_});
+    best->running.push_back({task.task, task.order, 1, now_ms_, {demand.worker}});
     return give(best, task.task, task.order, demand.worker);
   }
 
-  std::vector<TaskView>::const_iterator choose(const JobView& job, const Demand& demand) {
-    const auto& runs = runs_[job.job];
+  std::vector<JobView::Ready>::const_iterator choose(const JobView& job, const Demand& demand) {
+    const auto& runs = runs_[job.id];
     const auto first_that = [&](const auto& fits) { return std::find_if(job.ready.begin(), job.ready.end(), fits); };
-    if (demand.last_job == job.job) {
-      const auto own = first_that([&](const TaskView& t) { return run_of(t.order) == run_of(demand.last_order); });
+    if (demand.last_job == job.id) {
+      const auto own =
+          first_that([&](const JobView::Ready& t) { return run_of(t.order) == run_of(demand.last_order); });
       if (own != job.ready.end()) return own;
     }
-    const auto free = first_that([&](const TaskView& t) {
+    const auto free = first_that([&](const JobView::Ready& t) {
       const auto at = runs.lower_bound({run_of(t.order), std::string()});
       return at == runs.end() || at->first != run_of(t.order);
     });
@@ -73,12 +74,12 @@ class Deciding {
 
   std::optional<Decision> straggler(const Demand& demand) {
     JobView* of = nullptr;
-    LeasedView* oldest = nullptr;
+    JobView::Running* oldest = nullptr;
     for (JobView& job : jobs_) {
-      for (LeasedView& task : job.leased) {
+      for (JobView::Running& task : job.running) {
         if (task.workers.size() != 1 || task.workers.front() == demand.worker) continue;
-        if (now_ms_ - task.oldest_ms < options_.straggler_ms) continue;
-        if (oldest == nullptr || std::pair(task.oldest_ms, task.task) < std::pair(oldest->oldest_ms, oldest->task)) {
+        if (now_ms_ - task.leased_ms < options_.straggler_ms) continue;
+        if (oldest == nullptr || std::pair(task.leased_ms, task.task) < std::pair(oldest->leased_ms, oldest->task)) {
           of = &job, oldest = &task;
         }
       }
@@ -92,8 +93,8 @@ class Deciding {
   int64_t now_ms_;
   DecideOptions options_;
   std::map<std::string, uint64_t> out_of_client_;
-  std::map<int64_t, uint64_t> out_of_job_;
-  std::map<int64_t, std::set<std::pair<int64_t, std::string>>> runs_;  // per job: runs that workers are in
+  std::map<JobId, uint64_t> out_of_job_;
+  std::map<JobId, std::set<std::pair<int64_t, std::string>>> runs_;  // per job: runs that workers are in
 };
 
 }  // namespace

@@ -5,34 +5,15 @@
 #include <string>
 #include <vector>
 
+#include "bake-server/store/store.h"
+
 namespace lightloom {
-
-/// A task that waits, or that has been leased.
-struct TaskView {
-  int64_t task = 0;
-  int64_t order = 0;  ///< neighbours have near numbers
-};
-struct LeasedView {
-  int64_t task = 0;
-  int64_t order = 0;
-  std::vector<std::string> workers;  ///< that have it
-  int64_t oldest_ms = 0;             ///< when the first of these leases began
-};
-
-/// What a running job has to give out.
-struct JobView {
-  int64_t job = 0;
-  std::string client;
-  int32_t priority = 0;
-  std::vector<TaskView> ready;     ///< nobody has them; by order, perhaps not all
-  std::vector<LeasedView> leased;  ///< all
-};
 
 /// A worker that asks.
 struct Demand {
   std::string worker;
   uint32_t room = 0;  ///< tasks that it could take
-  int64_t last_job = 0;
+  JobId last_job = 0;
   int64_t last_order = 0;  ///< of the task that it took last
 };
 
@@ -44,7 +25,9 @@ struct DecideOptions {
 };
 
 struct Decision {
-  int64_t job = 0, task = 0, order = 0;
+  JobId job = 0;
+  TaskId task = 0;
+  int64_t order = 0;
   std::string worker;
 };
 

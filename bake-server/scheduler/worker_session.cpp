@@ -4,10 +4,6 @@
 
 namespace lightloom {
 
-WorkerSession::WorkerSession(std::vector<std::string> held) {
-  for (std::string& attempt : held) attempts_.emplace(std::move(attempt), 0);
-}
-
 SyncOutcome WorkerSession::sync(const SyncFacts& facts) {
   SyncOutcome out;
   const bool restarted = incarnation_ != 0 && facts.incarnation != incarnation_;

@@ -13,7 +13,7 @@ namespace lightloom {
 struct SyncFacts {
   uint64_t incarnation = 0;
   uint64_t sequence = 0;
-  uint64_t seen = 0;                ///< highest answer that has arrived
+  uint64_t seen = 0;          ///< highest answer that has arrived
   std::set<std::string> has;  ///< attempts that it runs, or reports as finished, failed or released
 };
 
@@ -28,9 +28,6 @@ struct SyncOutcome {
 /// that carried it. Only what it does not have although it saw that answer is gone.
 class WorkerSession {
  public:
-  /// Attempts that are this worker's by the record: what is left of an earlier coordinator. They count as held.
-  explicit WorkerSession(std::vector<std::string> held = {});
-
   SyncOutcome sync(const SyncFacts& facts);
   /// The number of the answer to the last Sync.
   uint64_t answer() { return ++answers_; }

@@ -1,25 +1,51 @@
-#include <algorithm>
+#include "core/bake/assemble.h"
 
-#include "core/bake/bake.h"
-#include "core/base/check.h"
+#include <algorithm>
+#include <string>
+
 #include "core/base/version.h"
 
 namespace lightloom {
+namespace {
 
-std::vector<uint32_t> used_probes(const std::vector<CellResult>& cells) {
+/// Records come from other machines: nothing in them may reach past the plan.
+absl::Status check_fit(const Plan& plan, const Scene& scene, const std::vector<CellRecord>& cells,
+                       const std::vector<ChunkRef>& relight, const std::vector<ChunkRef>& surfaces) {
+  const auto bad = [](const std::string& what) {
+    return absl::InvalidArgumentError("cannot assemble the bake: " + what + "; run all tasks of one plan");
+  };
+  const size_t probes = plan.placement.probes.size();
+  if (cells.size() != plan.cells.size() || relight.size() != probes || surfaces.size() != scene.objects.size()) {
+    return bad("cells, probes or surfaces are not as many as planned");
+  }
+  for (size_t i = 0; i < cells.size(); ++i) {
+    const CellRecord& c = cells[i];
+    if (c.receivers() != plan.cells[i].receivers.size()) {
+      return bad("cell " + std::to_string(i) + " has " + std::to_string(c.receivers()) + " receivers, planned were " +
+                 std::to_string(plan.cells[i].receivers.size()));
+    }
+    for (const uint32_t p : c.probe_ids) {
+      if (p >= probes) return bad("cell " + std::to_string(i) + " reads a probe that is not planned");
+      if (relight[p].size == 0) return bad("probe " + std::to_string(p) + " has no relight set");
+    }
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+std::vector<uint32_t> used_probes(const std::vector<CellRecord>& cells) {
   std::vector<uint32_t> used;
-  for (const CellResult& c : cells) used.insert(used.end(), c.probe_ids.begin(), c.probe_ids.end());
+  for (const CellRecord& c : cells) used.insert(used.end(), c.probe_ids.begin(), c.probe_ids.end());
   std::sort(used.begin(), used.end());
   used.erase(std::unique(used.begin(), used.end()), used.end());
   return used;
 }
 
-Manifest assemble(const Plan& plan, const Scene& scene, const std::vector<CellResult>& cells,
-                  const std::vector<ChunkRef>& cell_refs, const std::vector<ChunkRef>& relight,
-                  const std::vector<ChunkRef>& surfaces) {
+absl::StatusOr<Manifest> assemble(const Plan& plan, const Scene& scene, const std::vector<CellRecord>& cells,
+                                  const std::vector<ChunkRef>& relight, const std::vector<ChunkRef>& surfaces) {
+  LL_RETURN_IF_ERROR(check_fit(plan, scene, cells, relight, surfaces));
   const std::vector<uint32_t> used = used_probes(cells);
-  LL_CHECK(cells.size() == plan.cells.size() && cell_refs.size() == cells.size() && relight.size() == used.size() &&
-           surfaces.size() == scene.objects.size());
   Manifest m;
   m.method_version = std::string(kMethodVersion);
   m.scene_hash = scene_hash(scene);
@@ -34,30 +60,26 @@ Manifest assemble(const Plan& plan, const Scene& scene, const std::vector<CellRe
     m.objects.push_back({scene.objects[o].id, scene.objects[o].name, uv.width, uv.height, plan.layout.placements[o].x,
                          plan.layout.placements[o].y, surfaces[o]});
   }
-  for (size_t i = 0; i < used.size(); ++i) {
-    const Probe& p = plan.placement.probes[used[i]];
+  for (const uint32_t i : used) {
+    const Probe& p = plan.placement.probes[i];
     m.probes.push_back({p.position, p.cell, p.slot, relight[i]});
   }
   for (size_t i = 0; i < cells.size(); ++i) {
-    const CellResult& c = cells[i];
+    const CellRecord& c = cells[i];
     CellEntry entry;
     entry.level = plan.cells[i].level;
     entry.cell = plan.cells[i].cell;
     entry.bounds = c.bounds;
-    entry.receivers = static_cast<uint32_t>(c.chunk.receivers.size());
+    entry.receivers = static_cast<uint32_t>(c.receivers());
     entry.first_cluster = static_cast<uint32_t>(m.clusters.size());
-    entry.clusters = static_cast<uint32_t>(c.chunk.clusters.size());
+    entry.clusters = static_cast<uint32_t>(c.clusters.size());
     entry.first_probe = static_cast<uint32_t>(m.cell_probes.size());
     entry.probes = static_cast<uint32_t>(c.probe_ids.size());
-    entry.chunk = cell_refs[i];
+    entry.chunk = c.chunk;
     entry.error = static_cast<float>(c.error);
     entry.unseen =
-        c.stats.gather_rays > 0
-            ? static_cast<float>(static_cast<double>(c.stats.unseen) / static_cast<double>(c.stats.gather_rays))
-            : 0;
-    for (const CellChunk::Cluster& k : c.chunk.clusters) {
-      m.clusters.push_back({k.bounds, k.receivers, k.rank(), static_cast<uint32_t>(k.probes.size()), k.error});
-    }
+        c.gather_rays > 0 ? static_cast<float>(static_cast<double>(c.unseen) / static_cast<double>(c.gather_rays)) : 0;
+    m.clusters.insert(m.clusters.end(), c.clusters.begin(), c.clusters.end());
     for (const uint32_t p : c.probe_ids) {
       m.cell_probes.push_back(static_cast<uint32_t>(std::lower_bound(used.begin(), used.end(), p) - used.begin()));
     }

@@ -2,41 +2,32 @@
 
 #include <atomic>
 #include <mutex>
-#include <optional>
 
+#include "core/asset/asset.h"
+#include "core/bake/assemble.h"
+#include "core/bake/session.h"
 #include "core/base/stopwatch.h"
 
 namespace lightloom {
 namespace {
 
-/// Writes chunks from several threads and keeps the first error.
-class ChunkWriter {
+/// The first error of many threads.
+class FirstError {
  public:
-  explicit ChunkWriter(ChunkStore store) : store_(std::move(store)) {}
-
-  ChunkRef put(std::span<const uint8_t> bytes) {
-    const Stopwatch watch;
-    auto ref = store_.put(bytes);
+  void note(const absl::Status& status) {
     const std::lock_guard lock(mutex_);
-    seconds_ += watch.seconds();
-    if (!ref.ok()) {
-      if (status_.ok()) status_ = ref.status();
-      failed_ = true;
-      return {};
-    }
-    return *ref;
+    if (status_.ok()) status_ = status;
+    failed_ = true;
   }
-  /// Of a put: further ones are not worth the work.
+  /// Further work is not worth it.
   bool failed() const { return failed_.load(std::memory_order_relaxed); }
+  /// REQUIRES: the threads have ended.
   const absl::Status& status() const { return status_; }
-  double seconds() const { return seconds_; }
 
  private:
-  ChunkStore store_;
   std::mutex mutex_;
   std::atomic<bool> failed_{false};
-  absl::Status status_;  // guarded by mutex_, like the next
-  double seconds_ = 0;
+  absl::Status status_;  // guarded by mutex_
 };
 
 absl::Status cancelled(const std::filesystem::path& loom) {
@@ -46,17 +37,13 @@ absl::Status cancelled(const std::filesystem::path& loom) {
                               (old ? " still holds the earlier bake, whole" : " holds no asset yet: bake again"));
 }
 
-void add_cell(const CellResult& c, BakeReport* report) {
-  report->rays_gather += c.stats.gather_rays;
-  report->rays_visibility += c.stats.visibility_rays;
-  report->unseen += c.stats.unseen;
-  report->clusters += c.chunk.clusters.size();
-  for (const CellChunk::Cluster& k : c.chunk.clusters) {
-    report->coefficients += static_cast<double>(k.rank()) * k.receivers;
-    report->bytes_projection += k.projection.size() * sizeof(Half) + k.correction.size() * sizeof(float);
-    report->bytes_reconstruction += k.reconstruction.size() * sizeof(Half);
-  }
-  report->bytes_reconstruction += c.chunk.uniform.size() * sizeof(uint16_t);
+void add_cell(const CellRecord& c, BakeReport* report) {
+  report->rays_gather += c.gather_rays;
+  report->unseen += c.unseen;
+  report->clusters += c.clusters.size();
+  report->coefficients += static_cast<double>(c.coefficients);
+  report->bytes_projection += c.bytes_projection;
+  report->bytes_reconstruction += c.bytes_reconstruction;
 }
 
 }  // namespace
@@ -64,9 +51,9 @@ void add_cell(const CellResult& c, BakeReport* report) {
 absl::StatusOr<BakeReport> bake(const RayTracer& tracer, const BakeParams& params, const std::filesystem::path& loom,
                                 const BakeControl& control) {
   const Stopwatch watch;
-  const Scene& scene = tracer.scene();
   BakeReport report;
-  LL_ASSIGN_OR_RETURN(const Plan plan, make_plan(tracer, params, control));
+  LL_ASSIGN_OR_RETURN(const auto session, BakeSession::create(tracer, params, control));
+  const Plan& plan = session->plan();
   report.seconds_plan = watch.seconds();
   report.seconds_receivers = plan.seconds_receivers;
   report.seconds_probes = plan.seconds_probes;
@@ -74,35 +61,43 @@ absl::StatusOr<BakeReport> bake(const RayTracer& tracer, const BakeParams& param
   report.repairs = plan.placement.repairs;
   report.cells = plan.cells.size();
 
-  ChunkWriter writer(chunk_store(loom));
+  const ChunkStore store = chunk_store(loom);
+  std::atomic<double> seconds_write{0};
+  const ChunkSink sink = [&](std::span<const uint8_t> bytes) {
+    const Stopwatch write_watch;
+    auto ref = store.put(bytes);
+    seconds_write += write_watch.seconds();
+    return ref;
+  };
+  FirstError error;
+  // How a stage ended; `done` is what parallel_for said.
+  const auto outcome = [&](bool done) {
+    if (error.status().ok() ? !done : absl::IsCancelled(error.status())) return cancelled(loom);
+    return error.status();
+  };
+
   const Stopwatch cells_watch;
-  std::vector<CellResult> cells(plan.cells.size());
-  std::vector<ChunkRef> cell_refs(plan.cells.size());
-  std::atomic<uint64_t> rays{0};
-  std::vector<Vec3> probes;
-  for (const Probe& p : plan.placement.probes) probes.push_back(p.position);
-  std::optional<VisibilityCache> cache;
-  if (params.method != BakeMethod::kSl17) cache.emplace(tracer, plan.layout, plan.receivers.grids, probes);
+  std::vector<CellRecord> cells(plan.cells.size());
+  std::mutex mutex;  // guards the next two
+  double transport = 0, compress = 0;
   Parallel cell_stage = control.stage("cells");
   if (control.progress) {
     cell_stage.progress = [&](uint64_t finished, uint64_t total) {
-      control.progress("cells", finished, total, rays.load());
+      control.progress("cells", finished, total, session->cell_rays());
     };
   }
   bool done = parallel_for(cells.size(), cell_stage, [&](uint64_t i) {
-    if (writer.failed()) return;
-    cells[i] = bake_cell(tracer, cache ? &*cache : nullptr, make_cell_task(plan, tracer, plan.cells[i]));
-    rays += cells[i].stats.gather_rays + cells[i].stats.visibility_rays;
-    cell_refs[i] = writer.put(encode_cell(cells[i].chunk));
+    if (error.failed()) return;
+    auto cell = session->cell(i, sink, control.cancel);
+    if (!cell.ok()) return error.note(cell.status());
+    cells[i] = std::move(cell->record);
+    const std::lock_guard lock(mutex);
+    transport += cell->transport_seconds;
+    compress += cell->compress_seconds;
   });
-  LL_RETURN_IF_ERROR(writer.status());
-  if (!done) return cancelled(loom);
-  double transport = 0, compress = 0;
-  for (const CellResult& c : cells) {
-    add_cell(c, &report);
-    transport += c.transport_seconds;
-    compress += c.compress_seconds;
-  }
+  LL_RETURN_IF_ERROR(outcome(done));
+  for (const CellRecord& c : cells) add_cell(c, &report);
+  report.rays_visibility = session->cell_rays() - report.rays_gather;
   // The threads' shares of the stage's wall time.
   const double cells_seconds = cells_watch.seconds();
   if (transport + compress > 0) {
@@ -110,37 +105,32 @@ absl::StatusOr<BakeReport> bake(const RayTracer& tracer, const BakeParams& param
     report.seconds_compress = cells_seconds - report.seconds_transport;
   }
 
+  // Probes that no cell reads need no relight sets.
   const std::vector<uint32_t> used = used_probes(cells);
   report.probes = used.size();
   const Stopwatch relight_watch;
-  std::vector<ChunkRef> relight(used.size());
-  const ReceiverSearch search(scene, plan.layout, plan.receivers);
+  std::vector<ChunkRef> relight(plan.placement.probes.size());
   done = parallel_for(used.size(), control.stage("relight rays"), [&](uint64_t i) {
-    if (writer.failed()) return;
-    relight[i] =
-        writer.put(encode_relight(bake_relight(tracer, plan, search, plan.placement.probes[used[i]].position)));
+    if (error.failed()) return;
+    const auto refs = session->relight(used[i], 1, sink, control.cancel);
+    if (!refs.ok()) return error.note(refs.status());
+    relight[used[i]] = refs->front();
   });
-  LL_RETURN_IF_ERROR(writer.status());
-  if (!done) return cancelled(loom);
+  LL_RETURN_IF_ERROR(outcome(done));
   report.seconds_relight = relight_watch.seconds();
   report.rays_relight = used.size() * static_cast<uint64_t>(plan.params.relight_rays);
-  std::vector<ChunkRef> surfaces(scene.objects.size());
-  for (uint32_t o = 0; o < surfaces.size(); ++o) {
-    if (writer.failed()) break;
-    if (plan.layout.uv[o].corners.empty()) continue;
-    const SurfaceChunk surface = make_surface(plan, scene, o);
-    if (!surface.keys.empty()) surfaces[o] = writer.put(encode_surface(surface));
+  std::vector<ChunkRef> surfaces(session->scene().objects.size());
+  for (size_t o = 0; o < surfaces.size(); ++o) {
+    LL_ASSIGN_OR_RETURN(surfaces[o], session->surface(o, sink));
   }
-  LL_RETURN_IF_ERROR(writer.status());
-  report.seconds_write = writer.seconds();
+  report.seconds_write = seconds_write;
 
-  const Manifest manifest = assemble(plan, scene, cells, cell_refs, relight, surfaces);
+  LL_ASSIGN_OR_RETURN(const Manifest manifest, session->manifest(cells, relight, surfaces));
   LL_RETURN_IF_ERROR(write_manifest(loom, manifest));
-  for (const auto* refs : {&cell_refs, &relight, &surfaces}) {
-    for (const ChunkRef& ref : *refs) report.bytes_total += ref.size;
-  }
+  for (const CellRecord& c : cells) report.bytes_total += c.chunk.size;
   for (const ChunkRef& ref : relight) report.bytes_relight += ref.size;
-  report.bytes_total += std::filesystem::file_size(loom / "manifest");
+  for (const ChunkRef& ref : surfaces) report.bytes_total += ref.size;
+  report.bytes_total += report.bytes_relight + std::filesystem::file_size(loom / "manifest");
   if (report.receivers > 0) report.coefficients /= static_cast<double>(report.receivers);
   report.seconds_total = watch.seconds();
   return report;

@@ -3,9 +3,7 @@
 
 #include <filesystem>
 
-#include "core/asset/asset.h"
 #include "core/bake/plan.h"
-#include "core/bake/tasks.h"
 
 namespace lightloom {
 
@@ -24,12 +22,5 @@ struct BakeReport {
 /// Bakes into the folder `loom`. The old manifest, if any, stays in force until the new one replaces it whole.
 absl::StatusOr<BakeReport> bake(const RayTracer& tracer, const BakeParams& params, const std::filesystem::path& loom,
                                 const BakeControl& control);
-
-/// The manifest of finished tasks. `cells[i]` and `cell_refs[i]` belong to plan.cells[i]; `relight` and `surfaces` to
-/// the probes of used_probes(cells) and to the scene's objects.
-std::vector<uint32_t> used_probes(const std::vector<CellResult>& cells);
-Manifest assemble(const Plan& plan, const Scene& scene, const std::vector<CellResult>& cells,
-                  const std::vector<ChunkRef>& cell_refs, const std::vector<ChunkRef>& relight,
-                  const std::vector<ChunkRef>& surfaces);
 
 }  // namespace lightloom

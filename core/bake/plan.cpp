@@ -90,6 +90,7 @@ Parallel BakeControl::stage(const std::string& name) const {
 
 absl::Status check_params(const BakeParams& p) {
   const auto bad = [](const std::string& what) { return absl::InvalidArgumentError(what); };
+  if (p.method > BakeMethod::kSl17) return bad("--method must be default or sl17");
   if (p.order < 0 || p.order > kMaxShOrder) return bad("--order must be 0 to " + std::to_string(kMaxShOrder));
   if (!(p.spacing >= 0) || !std::isfinite(p.spacing)) return bad("--spacing must be a positive number of metres");
   if (p.probes < 0 || p.probes > 1 << 20) return bad("--probes must be 0 to 1048576");

@@ -89,7 +89,8 @@ CellTask make_cell_task(const Plan& plan, const RayTracer& tracer, const Planned
   return task;
 }
 
-CellResult bake_cell(const RayTracer& tracer, VisibilityCache* cache, const CellTask& task) {
+absl::StatusOr<CellResult> bake_cell(const RayTracer& tracer, VisibilityCache* cache, const CellTask& task,
+                                     const CancelFlag* cancel) {
   const int J = sh_count(task.params.order);
   const bool sl17 = task.params.method == BakeMethod::kSl17;
   CellResult out;
@@ -101,6 +102,7 @@ CellResult bake_cell(const RayTracer& tracer, VisibilityCache* cache, const Cell
   std::vector<Vec3> positions;
   Gatherer gatherer(tracer, cache, {task.probes, task.probe_ids}, {task.params.order, task.params.rays, !sl17});
   for (size_t r = 0; r < task.receivers.size(); ++r) {
+    if (cancel != nullptr && cancel->cancelled()) return absl::CancelledError("bake of a cell cancelled");
     const std::span<float> row(transport.row(static_cast<Eigen::Index>(r)).data(),
                                static_cast<size_t>(transport.cols()));
     out.stats += gatherer.add_row(task.receivers[r], row);

@@ -34,8 +34,9 @@ struct CellResult {
 
 CellTask make_cell_task(const Plan& plan, const RayTracer& tracer, const PlannedCell& cell);
 /// `cache` remembers what the plan's probes see, between cells; the result does not depend on what is in it. Null (as
-/// SL17 is published): a ray is traced for every hit and probe.
-CellResult bake_cell(const RayTracer& tracer, VisibilityCache* cache, const CellTask& task);
+/// SL17 is published): a ray is traced for every hit and probe. `cancel` may be null; the only error is cancellation.
+absl::StatusOr<CellResult> bake_cell(const RayTracer& tracer, VisibilityCache* cache, const CellTask& task,
+                                     const CancelFlag* cancel);
 
 /// What the probe sees along its relight rays, as texels of the plan's receivers.
 RelightChunk bake_relight(const RayTracer& tracer, const Plan& plan, const ReceiverSearch& receivers, Vec3 probe);

@@ -3,8 +3,10 @@
 #include <grpcpp/generic/generic_stub.h>
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
+#include <stdlib.h>
 
 #include <chrono>
+#include <filesystem>
 #include <future>
 #include <memory>
 #include <string>
@@ -12,6 +14,7 @@
 
 #include "bake-server/grpc/server.h"
 #include "bake-worker/join.h"
+#include "proto/client.h"
 #include "proto/job_service.grpc.pb.h"
 
 namespace lightloom {
@@ -26,17 +29,35 @@ Introduction fitting_worker() {
   return {.version = "9.9.8", .protocol_version = 1, .method_version = "method-a", .avx2 = true, .threads = 2};
 }
 
+/// A folder for a farm, removed at the end.
+class StateFolder {
+ public:
+  StateFolder() {
+    std::string name = (std::filesystem::temp_directory_path() / "lightloom-farm-XXXXXX").string();
+    path_ = ::mkdtemp(name.data());
+  }
+  ~StateFolder() { std::filesystem::remove_all(path_); }
+  StateFolder(const StateFolder&) = delete;
+  StateFolder& operator=(const StateFolder&) = delete;
+  std::unique_ptr<Farm> open() const { return std::move(Farm::open(path_)).value(); }
+
+ private:
+  std::filesystem::path path_;
+};
+
 enum class Transport { kInProcess, kTcp };
 
 class Handshake : public testing::TestWithParam<Transport> {
  protected:
   void SetUp() override {
-    auto server = Server::start("127.0.0.1:0", kInfo);
+    auto server = Server::start("127.0.0.1:0", kInfo, farm_.get());
     ASSERT_TRUE(server.ok()) << server.status();
     server_ = std::move(*server);
     channel_ = GetParam() == Transport::kInProcess ? server_->in_process_channel() : dial(server_->address());
   }
 
+  const StateFolder state_;
+  std::unique_ptr<Farm> farm_ = state_.open();
   std::unique_ptr<Server> server_;
   std::shared_ptr<grpc::Channel> channel_;
 };
@@ -126,7 +147,9 @@ INSTANTIATE_TEST_SUITE_P(, Handshake, testing::Values(Transport::kInProcess, Tra
 TEST(HandshakeErrors, AnUnreachableServerIsAnErrorWithinTheDeadline) {
   std::string address;
   {
-    const auto server = Server::start("127.0.0.1:0", kInfo);
+    const StateFolder state;
+    const auto farm = state.open();
+    const auto server = Server::start("127.0.0.1:0", kInfo, farm.get());
     ASSERT_TRUE(server.ok()) << server.status();
     address = (*server)->address();
   }  // nobody listens there any more
@@ -136,14 +159,18 @@ TEST(HandshakeErrors, AnUnreachableServerIsAnErrorWithinTheDeadline) {
 }
 
 TEST(HandshakeErrors, APortIsNotSharedWithASecondServer) {
-  const auto first = Server::start("127.0.0.1:0", kInfo);
+  const StateFolder state, other;
+  const auto farm = state.open(), other_farm = other.open();
+  const auto first = Server::start("127.0.0.1:0", kInfo, farm.get());
   ASSERT_TRUE(first.ok()) << first.status();
-  const auto second = Server::start((*first)->address(), kInfo);
+  const auto second = Server::start((*first)->address(), kInfo, other_farm.get());
   EXPECT_EQ(second.status().code(), absl::StatusCode::kUnavailable) << second.status();
 }
 
 TEST(HandshakeErrors, AddressesOfOtherMachinesAreRefused) {
-  EXPECT_EQ(Server::start("0.0.0.0:0", kInfo).status().code(), absl::StatusCode::kInvalidArgument);
+  const StateFolder state;
+  const auto farm = state.open();
+  EXPECT_EQ(Server::start("0.0.0.0:0", kInfo, farm.get()).status().code(), absl::StatusCode::kInvalidArgument);
 }
 
 TEST(HandshakeErrors, ThisMachineIsIntroducedWithThisProgramsVersions) {

@@ -36,7 +36,8 @@ class Blobs : public testing::Test {
     store_ = *std::move(opened);
   }
   size_t parts() const {
-    return static_cast<size_t>(std::distance(fs::directory_iterator(folder_ / "blobs/uploads"), fs::directory_iterator()));
+    return static_cast<size_t>(
+        std::distance(fs::directory_iterator(folder_ / "blobs/uploads"), fs::directory_iterator()));
   }
 
   fs::path folder_;

@@ -12,7 +12,10 @@ namespace {
 using ::testing::ElementsAre;
 
 JobView job(int64_t id, int tasks, const std::string& client = "a", int priority = 0) {
-  JobView out{id, client, priority, {}, {}};
+  JobView out;
+  out.id = id;
+  out.client = client;
+  out.priority = priority;
   for (int i = 0; i < tasks; ++i) out.ready.push_back({1000 * id + i, i});
   return out;
 }
@@ -62,7 +65,8 @@ TEST(Decide, ClientsShareEvenlyHoweverManyJobsTheyHave) {
 
 TEST(Decide, WhatIsOutCountsForTheShare) {
   JobView first = job(1, 10, "a");
-  for (int i = 0; i < 4; ++i) first.leased.push_back({500 + i, 100 + i, {"v"}, 0});
+  for (int i = 0; i < 4; ++i) first.running.push_back({500 + i, 100 + i, 1, 0, {"v"}});
+  first.live = 4;
   EXPECT_EQ(per_job(decide({first, job(2, 10, "b")}, {{"w", 4}}, 0)).at(2), 4);
 }
 
@@ -80,7 +84,7 @@ TEST(Decide, WorkersStayInRunsOfTheirOwn) {
 
 TEST(Decide, StragglersAreLeasedOnceMoreWhenNothingElseIsLeft) {
   JobView end = job(1, 0);
-  end.leased = {{7, 0, {"v"}, 5'000}, {8, 1, {"v"}, 1'000}, {9, 2, {"u", "v"}, 0}, {10, 3, {"w"}, 0}};
+  end.running = {{7, 0, 1, 5'000, {"v"}}, {8, 1, 1, 1'000, {"v"}}, {9, 2, 2, 0, {"u", "v"}}, {10, 3, 1, 0, {"w"}}};
   DecideOptions options;
   options.straggler_ms = 60'000;
   EXPECT_TRUE(decide({end}, {{"w", 4}}, 60'000, options).empty());

@@ -1,4 +1,4 @@
-#include "bake-server/stop_signal.h"
+#include "core/base/stop_signal.h"
 
 #include "core/base/check.h"
 

@@ -1,0 +1,136 @@
+#include "bake-server/grpc/worker_service.h"
+
+#include <spdlog/spdlog.h>
+
+#include "bake-server/grpc/tasks.h"
+#include "bake-server/grpc/translate.h"
+#include "core/base/text.h"
+#include "proto/worker_service.grpc.pb.h"
+
+namespace lightloom {
+namespace {
+
+constexpr uint32_t kMaxWaitMs = 30'000, kMaxRoom = 4096;
+constexpr size_t kMaxReasonBytes = 1024;
+
+v1::JoinResponse::Refused::Reason to_proto(Refusal refusal) {
+  using Refused = v1::JoinResponse::Refused;
+  switch (refusal) {
+    case Refusal::kProtocolVersion:
+      return Refused::PROTOCOL_VERSION;
+    case Refusal::kMethodVersion:
+      return Refused::METHOD_VERSION;
+    case Refusal::kMissingAvx2:
+      return Refused::MISSING_AVX2;
+    case Refusal::kNoThreads:
+      return Refused::NO_THREADS;
+    case Refusal::kNone:
+      break;
+  }
+  return Refused::REASON_UNSPECIFIED;
+}
+
+Admission admit(const v1::JoinRequest& request, const ServerInfo& info) {
+  return lightloom::admit({.protocol_version = request.protocol_version(),
+                           .method_version = request.method_version(),
+                           .avx2 = request.avx2(),
+                           .threads = request.threads()},
+                          info);
+}
+
+bool is_worker_name(const std::string& name) {
+  return !name.empty() && name.size() <= 64 && std::all_of(name.begin(), name.end(), [](unsigned char c) {
+    return std::isalnum(c) || c == '.' || c == '_' || c == '-';
+  });
+}
+
+absl::StatusOr<SyncMessage> to_message(const v1::SyncRequest& request) {
+  if (!is_worker_name(request.worker())) {
+    return absl::InvalidArgumentError("a worker's name must have 1 to 64 letters, digits, dots, dashes or underscores");
+  }
+  SyncMessage out;
+  out.worker = request.worker();
+  out.version = printable(request.who().version(), 64);
+  out.threads = request.who().threads();
+  out.incarnation = request.incarnation();
+  out.sequence = request.sequence();
+  out.seen = request.seen();
+  out.room = std::min(request.room(), kMaxRoom);
+  out.wait_ms = std::min(request.wait_ms(), kMaxWaitMs);
+  out.draining = request.draining();
+  for (const auto& r : request.running()) out.running.push_back({r.attempt(), r.rays()});
+  for (const auto& f : request.finished()) {
+    SyncMessage::Finished finished{f.attempt(), {}, {}, f.rays()};
+    for (const std::string& d : f.outputs()) {
+      LL_ASSIGN_OR_RETURN(finished.outputs.emplace_back(), to_digest(d));
+    }
+    LL_ASSIGN_OR_RETURN(finished.tasks, to_tasks(f.tasks()));
+    out.finished.push_back(std::move(finished));
+  }
+  for (const auto& f : request.failed()) out.failed.push_back({f.attempt(), printable(f.reason(), kMaxReasonBytes)});
+  out.released.assign(request.released().begin(), request.released().end());
+  return out;
+}
+
+void to_proto(const SyncAnswer& answer, v1::SyncResponse* out) {
+  out->set_sequence(answer.sequence);
+  out->set_lease_ms(answer.lease_ms);
+  for (const std::string& a : answer.acknowledged) out->add_acknowledged(a);
+  for (const std::string& a : answer.lost) out->add_lost(a);
+  for (const Assignment& a : answer.assignments) {
+    auto* to = out->add_assignments();
+    to->set_attempt(a.attempt);
+    to->set_job(static_cast<uint64_t>(a.job));
+    to->set_payload(a.payload);
+    to->set_kind(a.kind);
+    to->set_argument(a.argument);
+    if (a.inputs) to->set_inputs(to_bytes(*a.inputs));
+  }
+}
+
+class WorkerService final : public v1::WorkerService::CallbackService {
+ public:
+  WorkerService(ServerInfo info, Coordinator* coordinator) : info_(std::move(info)), coordinator_(coordinator) {}
+
+  grpc::ServerUnaryReactor* Join(grpc::CallbackServerContext* context, const v1::JoinRequest* request,
+                                 v1::JoinResponse* response) override {
+    const Admission admission = admit(*request, info_);
+    if (admission.accepted()) {
+      spdlog::info("worker {} joined: version {}, {} threads", context->peer(), printable(request->version(), 64),
+                   request->threads());
+      response->mutable_accepted()->set_server_version(info_.version);
+    } else {
+      spdlog::warn("worker {} refused: {}", context->peer(), admission.message);
+      response->mutable_refused()->set_reason(to_proto(admission.refusal));
+      response->mutable_refused()->set_message(admission.message);
+    }
+    return finish(context, absl::OkStatus());
+  }
+
+  grpc::ServerUnaryReactor* Sync(grpc::CallbackServerContext* context, const v1::SyncRequest* request,
+                                 v1::SyncResponse* response) override {
+    // A server of another release may have taken this one's place since the worker joined.
+    const Admission admission = admit(request->who(), info_);
+    if (!admission.accepted()) return finish(context, absl::FailedPreconditionError(admission.message));
+    auto message = to_message(*request);
+    if (!message.ok()) return finish(context, message.status());
+    grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    coordinator_->sync(*std::move(message), [reactor, response](const absl::StatusOr<SyncAnswer>& answer) {
+      if (answer.ok()) to_proto(*answer, response);
+      reactor->Finish(to_grpc(answer.status()));
+    });
+    return reactor;
+  }
+
+ private:
+  const ServerInfo info_;
+  Coordinator* coordinator_;
+};
+
+}  // namespace
+
+std::unique_ptr<grpc::Service> make_worker_service(const ServerInfo& info, Coordinator* coordinator) {
+  return std::make_unique<WorkerService>(info, coordinator);
+}
+
+}  // namespace lightloom

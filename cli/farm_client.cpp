@@ -1,0 +1,264 @@
+#include "cli/farm_client.h"
+
+#include <grpcpp/grpcpp.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <random>
+
+#include "core/asset/asset.h"
+#include "core/bake/task_runner.h"
+#include "core/base/text.h"
+#include "core/base/version.h"
+#include "proto/client.h"
+#include "proto/job_service.grpc.pb.h"
+
+namespace lightloom {
+namespace {
+
+std::string bytes_of(const Digest& digest) { return {digest.bytes.begin(), digest.bytes.end()}; }
+
+std::string state_of(v1::Job::State state) {
+  switch (state) {
+    case v1::Job::RUNNING:
+      return "running";
+    case v1::Job::DONE:
+      return "done";
+    case v1::Job::PARTIAL:
+      return "partial";
+    case v1::Job::FAILED:
+      return "failed";
+    case v1::Job::CANCELLED:
+      return "cancelled";
+    default:
+      return "unknown";
+  }
+}
+
+RemoteJob to_job(const v1::Job& in) {
+  RemoteJob out;
+  out.id = in.id();
+  out.name = printable(in.name(), 256);
+  out.client = printable(in.client(), 64);
+  out.priority = in.priority();
+  out.state = state_of(in.state());
+  out.created_ms = in.created_ms();
+  out.finished_ms = in.finished_ms();
+  out.tasks = in.tasks();
+  out.done = in.tasks_done();
+  out.running = in.tasks_running();
+  out.failed = in.tasks_failed();
+  out.rays = in.rays();
+  out.rays_per_second = in.rays_per_second();
+  out.workers = in.workers();
+  out.revision = in.revision();
+  out.error = printable(in.error(), 1000);
+  for (const std::string& bytes : in.outputs()) {
+    Digest digest;
+    if (bytes.size() == digest.bytes.size()) std::copy(bytes.begin(), bytes.end(), digest.bytes.begin());
+    out.outputs.push_back(digest);
+  }
+  return out;
+}
+
+std::string new_request_id() {
+  std::random_device random;
+  char text[33];
+  std::snprintf(text, sizeof text, "%08x%08x%08x%08x", random(), random(), random(), random());
+  return text;
+}
+
+}  // namespace
+
+struct FarmClient::Connection {
+  explicit Connection(const std::string& server)
+      : channel(dial(server)), jobs(v1::JobService::NewStub(channel)), blobs(channel) {}
+  std::shared_ptr<grpc::Channel> channel;
+  std::unique_ptr<v1::JobService::Stub> jobs;
+  BlobClient blobs;
+
+  template <class Request, class Response>
+  absl::Status call(grpc::Status (v1::JobService::Stub::*method)(grpc::ClientContext*, const Request&, Response*),
+                    const Request& request, Response* response) {
+    return call_with_retries(
+        {}, [&](grpc::ClientContext* context) { return ((*jobs).*method)(context, request, response); });
+  }
+};
+
+FarmClient::FarmClient(const std::string& server)
+    : server_(server), connection_(std::make_unique<Connection>(server)) {}
+FarmClient::~FarmClient() = default;
+
+absl::Status FarmClient::in_words(const absl::Status& status) const {
+  if (status.ok()) return status;
+  if (absl::IsUnavailable(status) || absl::IsDeadlineExceeded(status)) {
+    return absl::UnavailableError(server_ + " does not answer (" + std::string(status.message()) +
+                                  "); is lightloom-server running there?");
+  }
+  return absl::Status(status.code(), server_ + ": " + std::string(status.message()));
+}
+
+absl::StatusOr<RemoteJob> FarmClient::submit(std::span<const uint8_t> scene, const BakeParams& params,
+                                             const std::string& name, int32_t priority,
+                                             const std::function<void(uint64_t)>& progress) {
+  // Before the level goes up: a server that would refuse it.
+  v1::ServerInfo info;
+  LL_RETURN_IF_ERROR(
+      in_words(connection_->call(&v1::JobService::Stub::GetServerInfo, v1::GetServerInfoRequest(), &info)));
+  if (info.method_version() != kMethodVersion) {
+    return absl::FailedPreconditionError(server_ + " bakes by method version '" + printable(info.method_version(), 64) +
+                                         "', this program by '" + std::string(kMethodVersion) +
+                                         "': install the same release of lightloom on both");
+  }
+  const auto digest = connection_->blobs.upload(scene, progress);
+  if (!digest.ok()) return in_words(digest.status());
+
+  v1::SubmitRequest request;
+  request.set_request_id(new_request_id());
+  const char* user = std::getenv("USER");
+  request.set_client(printable(user != nullptr ? user : "", 64));
+  request.set_name(name.substr(0, 256));
+  request.set_priority(priority);
+  request.set_method_version(std::string(kMethodVersion));
+  const std::vector<uint8_t> payload = encode_payload({*digest, params});
+  request.set_payload(payload.data(), payload.size());
+  request.add_inputs(bytes_of(*digest));
+  const SpawnedTask first = first_task();
+  auto* task = request.add_tasks();
+  task->set_kind(first.kind);
+  task->set_stage(first.stage);
+  task->set_argument(first.argument.data(), first.argument.size());
+  task->set_order(first.order);
+  v1::Job job;
+  LL_RETURN_IF_ERROR(in_words(connection_->call(&v1::JobService::Stub::Submit, request, &job)));
+  return to_job(job);
+}
+
+absl::StatusOr<RemoteJob> FarmClient::job(uint64_t id) {
+  v1::GetJobRequest request;
+  request.set_id(id);
+  v1::Job job;
+  LL_RETURN_IF_ERROR(in_words(connection_->call(&v1::JobService::Stub::GetJob, request, &job)));
+  return to_job(job);
+}
+
+absl::StatusOr<std::vector<RemoteJob>> FarmClient::jobs() {
+  std::vector<RemoteJob> out;
+  for (;;) {
+    v1::ListJobsRequest request;
+    request.set_after(out.empty() ? 0 : out.back().id);
+    v1::ListJobsResponse response;
+    LL_RETURN_IF_ERROR(in_words(connection_->call(&v1::JobService::Stub::ListJobs, request, &response)));
+    if (response.jobs().empty()) return out;
+    for (const v1::Job& job : response.jobs()) out.push_back(to_job(job));
+  }
+}
+
+absl::StatusOr<RemoteJob> FarmClient::cancel(uint64_t id) {
+  v1::CancelJobRequest request;
+  request.set_id(id);
+  v1::Job job;
+  LL_RETURN_IF_ERROR(in_words(connection_->call(&v1::JobService::Stub::CancelJob, request, &job)));
+  return to_job(job);
+}
+
+absl::StatusOr<RemoteJob> FarmClient::set_priority(uint64_t id, int32_t priority) {
+  v1::SetPriorityRequest request;
+  request.set_id(id);
+  request.set_priority(priority);
+  v1::Job job;
+  LL_RETURN_IF_ERROR(in_words(connection_->call(&v1::JobService::Stub::SetPriority, request, &job)));
+  return to_job(job);
+}
+
+absl::StatusOr<std::vector<RemoteWorker>> FarmClient::workers() {
+  v1::ListWorkersResponse response;
+  LL_RETURN_IF_ERROR(
+      in_words(connection_->call(&v1::JobService::Stub::ListWorkers, v1::ListWorkersRequest(), &response)));
+  std::vector<RemoteWorker> out;
+  for (const auto& w : response.workers()) {
+    out.push_back(
+        {printable(w.id(), 64), printable(w.version(), 64), w.threads(), w.running(), w.silent_ms(), w.draining()});
+  }
+  return out;
+}
+
+absl::StatusOr<std::vector<RemoteEvent>> FarmClient::events(uint64_t job) {
+  std::vector<RemoteEvent> out;
+  for (;;) {
+    v1::ListEventsRequest request;
+    request.set_job(job);
+    request.set_after(out.empty() ? 0 : out.back().id);
+    request.set_limit(1000);
+    v1::ListEventsResponse response;
+    LL_RETURN_IF_ERROR(in_words(connection_->call(&v1::JobService::Stub::ListEvents, request, &response)));
+    if (response.events().empty()) return out;
+    for (const auto& e : response.events()) {
+      out.push_back(
+          {e.id(), e.at_ms(), printable(e.task(), 100), printable(e.worker(), 64), printable(e.what(), 1100)});
+    }
+  }
+}
+
+absl::StatusOr<RemoteJob> FarmClient::watch(uint64_t id, const CancelFlag& cancel,
+                                            const std::function<void(const RemoteJob&)>& changed) {
+  RemoteJob last;
+  Patience patience;
+  patience.call = std::chrono::hours(24);
+  patience.give_up = [&] { return cancel.cancelled() || last.ended(); };
+  last.state = "running";
+  while (!last.ended()) {
+    const absl::Status status = call_with_retries(patience, [&](grpc::ClientContext* context) {
+      v1::WatchJobRequest request;
+      request.set_id(id);
+      request.set_after_revision(last.revision);
+      const auto reader = connection_->jobs->WatchJob(context, request);
+      v1::Job job;
+      while (reader->Read(&job)) {
+        last = to_job(job);
+        changed(last);
+        if (cancel.cancelled()) context->TryCancel();
+      }
+      return reader->Finish();
+    });
+    if (cancel.cancelled()) return absl::CancelledError("stopped watching; the job goes on");
+    if (!status.ok() && !last.ended()) return in_words(status);
+  }
+  return last;
+}
+
+absl::StatusOr<Manifest> FarmClient::fetch(uint64_t id, const std::string& loom, const CancelFlag& cancel,
+                                           const std::function<void(uint64_t, uint64_t)>& progress) {
+  LL_ASSIGN_OR_RETURN(const RemoteJob job, this->job(id));
+  if (job.state != "done" || job.outputs.empty()) {
+    return absl::FailedPreconditionError(
+        "job " + std::to_string(id) + " is " + job.state + (job.error.empty() ? "" : " (" + job.error + ")") +
+        "; only what is done can be fetched" + (job.ended() ? "" : ": lightloom watch " + std::to_string(id)));
+  }
+  const auto bytes = connection_->blobs.download(job.outputs.front());
+  if (!bytes.ok()) return in_words(bytes.status());
+  LL_ASSIGN_OR_RETURN(Manifest manifest, decode_manifest(*bytes));
+  std::vector<ChunkRef> chunks;
+  for (const ObjectEntry& o : manifest.objects) chunks.push_back(o.surface);
+  for (const ProbeEntry& p : manifest.probes) chunks.push_back(p.relight);
+  for (const CellEntry& c : manifest.cells) chunks.push_back(c.chunk);
+  std::erase_if(chunks, [](const ChunkRef& c) { return c.size == 0; });
+  const ChunkStore store = chunk_store(loom);
+  uint64_t there = 0;
+  for (const ChunkRef& chunk : chunks) {
+    if (cancel.cancelled())
+      return absl::CancelledError("fetch cancelled; what is there is kept, so fetch goes on from here");
+    if (!store.get(chunk).ok()) {
+      const auto data = connection_->blobs.download(chunk.digest);
+      if (!data.ok()) return in_words(data.status());
+      LL_RETURN_IF_ERROR(store.put(*data).status());
+    }
+    progress(++there, chunks.size());
+  }
+  LL_RETURN_IF_ERROR(write_manifest(loom, manifest));
+  return manifest;
+}
+
+}  // namespace lightloom

@@ -1,0 +1,55 @@
+#include "cli/farm_print.h"
+
+#include <ctime>
+
+#include <nlohmann/json.hpp>
+
+#include "cli/progress.h"
+
+namespace lightloom {
+
+nlohmann::json to_json(const RemoteJob& job) {
+  return {{"job", job.id},
+          {"name", job.name},
+          {"client", job.client},
+          {"priority", job.priority},
+          {"state", job.state},
+          {"created_ms", job.created_ms},
+          {"finished_ms", job.finished_ms},
+          {"tasks", job.tasks},
+          {"tasks_done", job.done},
+          {"tasks_running", job.running},
+          {"tasks_failed", job.failed},
+          {"rays", job.rays},
+          {"rays_per_second", job.rays_per_second},
+          {"workers", job.workers},
+          {"error", job.error}};
+}
+
+std::string progress_line(const RemoteJob& job) {
+  std::string line = std::to_string(job.done) + " of " + std::to_string(job.tasks) + " tasks";
+  if (job.failed > 0) line += ", " + std::to_string(job.failed) + " failed";
+  if (job.ended()) return line;
+  line += ", " + std::to_string(job.running) + " running on " + std::to_string(job.workers) +
+          (job.workers == 1 ? " worker" : " workers");
+  if (job.rays_per_second > 0) line += ", " + human_count(job.rays_per_second) + "rays/s";
+  return line;
+}
+
+absl::Status how_it_ended(const RemoteJob& job) {
+  if (job.state == "done") return absl::OkStatus();
+  return absl::AbortedError("job " + std::to_string(job.id) + " ended " + job.state +
+                            (job.error.empty() ? "" : ": " + job.error) + "; see lightloom events " +
+                            std::to_string(job.id));
+}
+
+std::string local_time(int64_t unix_ms) {
+  const std::time_t seconds = unix_ms / 1000;
+  std::tm local{};
+  ::localtime_r(&seconds, &local);
+  char text[32];
+  std::strftime(text, sizeof text, "%Y-%m-%d %H:%M:%S", &local);
+  return text;
+}
+
+}  // namespace lightloom

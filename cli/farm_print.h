@@ -1,0 +1,19 @@
+// How the farm commands show jobs.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "cli/farm_client.h"
+
+namespace lightloom {
+
+nlohmann::json to_json(const RemoteJob& job);
+/// "12 of 650 tasks, 2 running on 2 workers, 2.31 M rays/s".
+std::string progress_line(const RemoteJob& job);
+/// OK for a job that is done; else an error that says how it ended.
+absl::Status how_it_ended(const RemoteJob& job);
+/// Local time, "2026-11-22 12:34:56".
+std::string local_time(int64_t unix_ms);
+
+}  // namespace lightloom

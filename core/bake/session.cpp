@@ -1,0 +1,135 @@
+#include "core/bake/session.h"
+
+#include <string>
+#include <string_view>
+
+#include "core/bake/assemble.h"
+#include "core/bake/tasks.h"
+#include "core/base/version.h"
+
+namespace lightloom {
+namespace {
+
+/// Of all that tasks read from the plan: workers whose plans differ must not work on the same bake.
+Digest hash_plan(const Plan& plan, const Scene& scene) {
+  Hasher h;
+  h.string("plan").string(kMethodVersion).digest(scene_hash(scene)).bytes(&plan.params, sizeof plan.params);
+  h.value(plan.layout.mode).value(plan.layout.width).value(plan.layout.height);
+  for (size_t o = 0; o < scene.objects.size(); ++o) {
+    const LightmapUv& uv = plan.layout.uv[o];
+    h.string(scene.objects[o].name).digest(scene.objects[o].id).value(uv.width).value(uv.height);
+    h.value(plan.layout.placements[o].x).value(plan.layout.placements[o].y);
+  }
+  for (const Receiver& r : plan.receivers.all) {
+    const struct {
+      uint32_t object, key;
+      Vec3 position;
+    } receiver{r.object, r.key, r.point.position};
+    h.bytes(&receiver, sizeof receiver);
+  }
+  for (const Probe& p : plan.placement.probes) {
+    h.bytes(&p.cell, sizeof p.cell).value(p.slot).bytes(&p.position, sizeof p.position);
+  }
+  for (const PlannedCell& c : plan.cells) h.value(c.level).bytes(&c.cell, sizeof c.cell).array(c.receivers);
+  return h.finish();
+}
+
+absl::Status not_planned(std::string_view what, size_t index, size_t planned) {
+  return absl::OutOfRangeError("there is no " + std::string(what) + " " + std::to_string(index) + ": the plan has " +
+                               std::to_string(planned) + "; run the tasks that the plan asks for");
+}
+
+CellRecord make_record(const CellResult& c, const ChunkRef& chunk) {
+  CellRecord record;
+  record.chunk = chunk;
+  record.bounds = c.bounds;
+  record.gather_rays = c.stats.gather_rays;
+  record.unseen = c.stats.unseen;
+  record.error = c.error;
+  record.probe_ids = c.probe_ids;
+  for (const CellChunk::Cluster& k : c.chunk.clusters) {
+    record.clusters.push_back({k.bounds, k.receivers, k.rank(), static_cast<uint32_t>(k.probes.size()), k.error});
+    record.coefficients += static_cast<uint64_t>(k.rank()) * k.receivers;
+    record.bytes_projection += k.projection.size() * sizeof(Half) + k.correction.size() * sizeof(float);
+    record.bytes_reconstruction += k.reconstruction.size() * sizeof(Half);
+  }
+  record.bytes_reconstruction += c.chunk.uniform.size() * sizeof(uint16_t);
+  return record;
+}
+
+std::vector<Vec3> positions_of(const std::vector<Probe>& probes) {
+  std::vector<Vec3> positions;
+  positions.reserve(probes.size());
+  for (const Probe& p : probes) positions.push_back(p.position);
+  return positions;
+}
+
+}  // namespace
+
+BakeSession::BakeSession(const RayTracer& tracer, Plan plan)
+    : tracer_(tracer),
+      plan_(std::move(plan)),
+      plan_digest_(hash_plan(plan_, tracer.scene())),
+      probes_(positions_of(plan_.placement.probes)),
+      search_(tracer.scene(), plan_.layout, plan_.receivers) {
+  if (plan_.params.method == BakeMethod::kSl17) return;
+  cache_ = std::make_unique<VisibilityCache>(tracer, plan_.layout, plan_.receivers.grids, probes_);
+}
+
+absl::StatusOr<std::unique_ptr<BakeSession>> BakeSession::create(const RayTracer& tracer, const BakeParams& params,
+                                                                 const BakeControl& control) {
+  LL_ASSIGN_OR_RETURN(Plan plan, make_plan(tracer, params, control));
+  return std::unique_ptr<BakeSession>(new BakeSession(tracer, std::move(plan)));
+}
+
+absl::StatusOr<std::unique_ptr<BakeSession>> BakeSession::create(Scene scene, const BakeParams& params,
+                                                                 const BakeControl& control) {
+  Owned owned;
+  owned.scene = std::make_unique<const Scene>(std::move(scene));
+  LL_ASSIGN_OR_RETURN(owned.tracer, RayTracer::create(*owned.scene));
+  LL_ASSIGN_OR_RETURN(auto session, create(*owned.tracer, params, control));
+  session->owned_ = std::move(owned);
+  return session;
+}
+
+absl::StatusOr<BakedCell> BakeSession::cell(size_t index, const ChunkSink& sink, const CancelFlag* cancel) const {
+  if (index >= plan_.cells.size()) return not_planned("cell", index, plan_.cells.size());
+  const CellTask task = make_cell_task(plan_, tracer_, plan_.cells[index]);
+  LL_ASSIGN_OR_RETURN(const CellResult result, bake_cell(tracer_, cache_.get(), task, cancel));
+  cell_rays_ += result.stats.gather_rays + result.stats.visibility_rays;
+  LL_ASSIGN_OR_RETURN(const ChunkRef chunk, sink(encode_cell(result.chunk)));
+  return BakedCell{make_record(result, chunk), result.stats.visibility_rays, result.transport_seconds,
+                   result.compress_seconds};
+}
+
+absl::StatusOr<std::vector<ChunkRef>> BakeSession::relight(size_t first, size_t count, const ChunkSink& sink,
+                                                           const CancelFlag* cancel) const {
+  const auto& probes = plan_.placement.probes;
+  if (first > probes.size() || count > probes.size() - first) {
+    return not_planned("probe", first + count - 1, probes.size());
+  }
+  std::vector<ChunkRef> refs;
+  for (size_t i = first; i < first + count; ++i) {
+    if (cancel != nullptr && cancel->cancelled()) return absl::CancelledError("relight rays cancelled");
+    LL_ASSIGN_OR_RETURN(const ChunkRef chunk,
+                        sink(encode_relight(bake_relight(tracer_, plan_, search_, probes[i].position))));
+    refs.push_back(chunk);
+  }
+  return refs;
+}
+
+absl::StatusOr<ChunkRef> BakeSession::surface(size_t object, const ChunkSink& sink) const {
+  if (object >= scene().objects.size()) return not_planned("object", object, scene().objects.size());
+  if (plan_.layout.uv[object].corners.empty()) return ChunkRef{};
+  const SurfaceChunk surface = make_surface(plan_, scene(), static_cast<uint32_t>(object));
+  if (surface.keys.empty()) return ChunkRef{};
+  return sink(encode_surface(surface));
+}
+
+absl::StatusOr<Manifest> BakeSession::manifest(const std::vector<CellRecord>& cells,
+                                               const std::vector<ChunkRef>& relight,
+                                               const std::vector<ChunkRef>& surfaces) const {
+  return assemble(plan_, scene(), cells, relight, surfaces);
+}
+
+}  // namespace lightloom

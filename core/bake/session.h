@@ -1,0 +1,82 @@
+// One level being baked by this process: what all its tasks share is made once and kept.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <vector>
+
+#include "core/bake/cell_record.h"
+#include "core/bake/plan.h"
+#include "core/receivers/receiver_search.h"
+#include "core/transport/visibility_cache.h"
+
+namespace lightloom {
+
+/// Stores a chunk; called from any thread.
+using ChunkSink = std::function<absl::StatusOr<ChunkRef>(std::span<const uint8_t> bytes)>;
+
+/// A finished cell, and what it cost this time: not the same in every run.
+struct BakedCell {
+  CellRecord record;
+  uint64_t visibility_rays = 0;
+  double transport_seconds = 0, compress_seconds = 0;  ///< thread time
+};
+
+/// Thread-safe after construction. What it returns and stores is a pure function of scene and parameters.
+/// Errors of all methods: an index that is not planned (OutOfRange), cancellation, and those of the sink.
+class BakeSession {
+ public:
+  /// Plans the bake. Errors: make_plan's. The tracer and its scene must outlive the session unchanged.
+  static absl::StatusOr<std::unique_ptr<BakeSession>> create(const RayTracer& tracer, const BakeParams& params,
+                                                             const BakeControl& control);
+  /// The session owns the scene.
+  static absl::StatusOr<std::unique_ptr<BakeSession>> create(Scene scene, const BakeParams& params,
+                                                             const BakeControl& control);
+  BakeSession(const BakeSession&) = delete;
+  BakeSession& operator=(const BakeSession&) = delete;
+
+  const Plan& plan() const { return plan_; }
+  const Scene& scene() const { return tracer_.scene(); }
+  /// Two sessions with equal digests give the same bytes for the same task.
+  const Digest& plan_digest() const { return plan_digest_; }
+
+  /// Bakes plan().cells[index] and stores its chunk. `cancel` may be null, here and below.
+  absl::StatusOr<BakedCell> cell(size_t index, const ChunkSink& sink, const CancelFlag* cancel = nullptr) const;
+  /// Relight sets of the plan's probes first … first + count − 1, in order.
+  absl::StatusOr<std::vector<ChunkRef>> relight(size_t first, size_t count, const ChunkSink& sink,
+                                                const CancelFlag* cancel = nullptr) const;
+  /// The receivers of an object; size 0 and nothing stored if it has none.
+  absl::StatusOr<ChunkRef> surface(size_t object, const ChunkSink& sink) const;
+  /// Of all calls so far, also those whose chunk could not be stored.
+  struct Spent {
+    uint64_t gather_rays = 0, visibility_rays = 0;
+    double transport_seconds = 0, compress_seconds = 0, relight_seconds = 0;  ///< thread time
+    uint64_t cell_rays() const { return gather_rays + visibility_rays; }
+  };
+  Spent spent() const;
+  /// See assemble().
+  absl::StatusOr<Manifest> manifest(const std::vector<CellRecord>& cells, const std::vector<ChunkRef>& relight,
+                                    const std::vector<ChunkRef>& surfaces) const;
+
+ private:
+  /// What a session keeps alive; empty around a borrowed tracer.
+  struct Owned {
+    std::unique_ptr<const Scene> scene;
+    std::unique_ptr<const RayTracer> tracer;
+  };
+  BakeSession(const RayTracer& tracer, Plan plan);
+
+  Owned owned_;
+  const RayTracer& tracer_;
+  const Plan plan_;
+  const Digest plan_digest_;
+  std::vector<Vec3> probes_;                // the plan's; the cache refers to them
+  std::unique_ptr<VisibilityCache> cache_;  // none for SL17, as published
+  ReceiverSearch search_;
+  mutable std::mutex mutex_;
+  mutable Spent spent_;  // guarded by mutex_
+};
+
+}  // namespace lightloom

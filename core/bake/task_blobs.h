@@ -1,0 +1,47 @@
+// The bytes by which tasks of a bake speak to each other; whoever hands them on need not read them. Little-endian, with
+// magic and version. Decoders trust nothing: sizes must match, numbers be in range.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/asset/manifest.h"
+
+namespace lightloom {
+
+/// What a job bakes: all of its tasks get this.
+struct BakePayload {
+  Digest scene;  ///< of the blob that holds the level's .glb
+  BakeParams params;
+  bool operator==(const BakePayload&) const = default;
+};
+/// Also says which method it asks for: this program's.
+std::vector<uint8_t> encode_payload(const BakePayload& payload);
+/// Errors: InvalidArgument (corrupt, or parameters out of range), FailedPrecondition (another method's).
+absl::StatusOr<BakePayload> decode_payload(std::span<const uint8_t> bytes);
+
+/// The argument of every kind but "plan", which has none.
+struct TaskArgument {
+  Digest plan;  ///< BakeSession::plan_digest() of who asked for it
+  uint32_t first = 0, count = 0;
+  bool operator==(const TaskArgument&) const = default;
+};
+std::vector<uint8_t> encode_argument(const TaskArgument& argument);
+absl::StatusOr<TaskArgument> decode_argument(std::span<const uint8_t> bytes);
+
+/// What "plan" found: for people and progress bars.
+struct PlanSummary {
+  Digest plan;
+  uint64_t receivers = 0;
+  uint32_t cells = 0, probes = 0, objects = 0;
+  bool operator==(const PlanSummary&) const = default;
+};
+std::vector<uint8_t> encode_plan_summary(const PlanSummary& summary);
+absl::StatusOr<PlanSummary> decode_plan_summary(std::span<const uint8_t> bytes);
+
+/// Names chunks; some may be absent (size 0).
+std::vector<uint8_t> encode_chunk_refs(const std::vector<ChunkRef>& refs);
+absl::StatusOr<std::vector<ChunkRef>> decode_chunk_refs(std::span<const uint8_t> bytes);
+
+}  // namespace lightloom

@@ -1,0 +1,306 @@
+#include "core/bake/task_runner.h"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <string_view>
+
+#include "core/bake/load_glb.h"
+#include "core/base/text.h"
+
+namespace lightloom {
+namespace {
+
+bool cancelled(const BakeControl& control) { return control.cancel != nullptr && control.cancel->cancelled(); }
+
+/// What a task works with.
+struct Context {
+  const BakeSession& session;
+  BlobAccess& blobs;
+  const BakeTask& task;
+  TaskArgument argument;
+  const BakeControl& control;
+
+  void report(uint64_t done, uint64_t total, uint64_t rays) const {
+    if (control.progress) control.progress(task.kind, done, total, rays);
+  }
+  ChunkSink sink() const {
+    return [this](std::span<const uint8_t> bytes) -> absl::StatusOr<ChunkRef> {
+      LL_ASSIGN_OR_RETURN(const Digest digest, blobs.put(bytes));
+      return ChunkRef{digest, bytes.size()};
+    };
+  }
+};
+
+/// The blob, or an error that says what it was wanted for. Storage is not trusted: other bytes would give other bakes.
+absl::StatusOr<std::vector<uint8_t>> fetch(BlobAccess* blobs, const Digest& digest, std::string_view what) {
+  const std::string name = std::string(what) + ", blob " + digest.hex();
+  auto bytes = blobs->get(digest);
+  if (!bytes.ok()) {
+    return absl::Status(bytes.status().code(),
+                        "cannot read " + name + ": " + std::string(bytes.status().message()) + "; store it again");
+  }
+  if (sha256(*bytes) != digest)
+    return absl::DataLossError(name + " has other bytes than its name says; store it again");
+  return bytes;
+}
+
+/// Stores the list of chunks; outputs are it and them.
+absl::StatusOr<TaskOutput> chunk_outputs(const Context& c, const std::vector<ChunkRef>& refs) {
+  TaskOutput out;
+  LL_ASSIGN_OR_RETURN(const Digest list, c.blobs.put(encode_chunk_refs(refs)));
+  out.outputs.push_back(list);
+  for (const ChunkRef& ref : refs) {
+    if (ref.size > 0) out.outputs.push_back(ref.digest);
+  }
+  return out;
+}
+
+absl::StatusOr<TaskOutput> run_plan(const Context& c) {
+  const Plan& plan = c.session.plan();
+  PlanSummary summary;
+  summary.plan = c.session.plan_digest();
+  summary.receivers = plan.receivers.all.size();
+  summary.cells = static_cast<uint32_t>(plan.cells.size());
+  summary.probes = static_cast<uint32_t>(plan.placement.probes.size());
+  summary.objects = static_cast<uint32_t>(c.session.scene().objects.size());
+  TaskOutput out;
+  LL_ASSIGN_OR_RETURN(const Digest blob, c.blobs.put(encode_plan_summary(summary)));
+  out.outputs.push_back(blob);
+
+  // Cells in the octree's order: neighbours share what a worker remembers.
+  int64_t order = 0;
+  const auto spawn = [&](const char* kind, uint32_t stage, uint32_t first, uint32_t count) {
+    out.spawned.push_back({kind, stage, encode_argument({summary.plan, first, count}), order++});
+  };
+  for (uint32_t i = 0; i < summary.cells; ++i) spawn("cell", 1, i, 1);
+  for (uint32_t i = 0; i < summary.probes; i += kRelightProbes) {
+    spawn("relight", 1, i, std::min(kRelightProbes, summary.probes - i));
+  }
+  spawn("surfaces", 1, 0, summary.objects);
+  spawn("assemble", 2, 0, 0);
+  return out;
+}
+
+absl::StatusOr<TaskOutput> run_cell(const Context& c) {
+  LL_ASSIGN_OR_RETURN(const BakedCell cell, c.session.cell(c.argument.first, c.sink(), c.control.cancel));
+  TaskOutput out;
+  LL_ASSIGN_OR_RETURN(const Digest record, c.blobs.put(encode_cell_record(cell.record)));
+  out.outputs = {record, cell.record.chunk.digest};
+  out.rays = cell.record.gather_rays + cell.visibility_rays;
+  return out;
+}
+
+absl::StatusOr<TaskOutput> run_relight(const Context& c) {
+  const uint64_t rays = static_cast<uint64_t>(c.session.plan().params.relight_rays);
+  std::vector<ChunkRef> refs;
+  // One by one, to report each.
+  for (uint32_t i = 0; i < c.argument.count; ++i) {
+    LL_ASSIGN_OR_RETURN(const auto one, c.session.relight(size_t{c.argument.first} + i, 1, c.sink(), c.control.cancel));
+    refs.push_back(one.front());
+    c.report(refs.size(), c.argument.count, refs.size() * rays);
+  }
+  LL_ASSIGN_OR_RETURN(TaskOutput out, chunk_outputs(c, refs));
+  out.rays = refs.size() * rays;
+  return out;
+}
+
+absl::StatusOr<TaskOutput> run_surfaces(const Context& c) {
+  std::vector<ChunkRef> refs;
+  for (uint32_t i = 0; i < c.argument.count; ++i) {
+    if (cancelled(c.control)) return absl::CancelledError("task 'surfaces' cancelled");
+    LL_ASSIGN_OR_RETURN(const ChunkRef ref, c.session.surface(size_t{c.argument.first} + i, c.sink()));
+    refs.push_back(ref);
+    c.report(refs.size(), c.argument.count, 0);
+  }
+  return chunk_outputs(c, refs);
+}
+
+/// Puts what the tasks of stage 1 made in its place.
+class Assembly {
+ public:
+  explicit Assembly(const Context& c)
+      : c_(c),
+        cells_(c.session.plan().cells.size()),
+        relight_(c.session.plan().placement.probes.size()),
+        surfaces_(c.session.scene().objects.size()),
+        have_cell_(cells_.size()),
+        have_relight_(relight_.size()),
+        have_surface_(surfaces_.size()) {}
+
+  absl::Status add(const FinishedTask& task) {
+    if (task.kind == "plan") return absl::OkStatus();
+    LL_ASSIGN_OR_RETURN(const TaskArgument argument, decode_argument(task.argument));
+    if (argument.plan != c_.session.plan_digest())
+      return bad("its task '" + printable(task.kind) + "' is another plan's");
+    if (task.outputs.empty()) return bad("its task '" + printable(task.kind) + "' has no outputs");
+    LL_ASSIGN_OR_RETURN(const auto blob,
+                        fetch(&c_.blobs, task.outputs.front(), "what '" + printable(task.kind) + "' gave"));
+    if (task.kind == "cell") {
+      LL_ASSIGN_OR_RETURN(CellRecord record, decode_cell_record(blob));
+      return place<CellRecord>(task.kind, argument, {std::move(record)}, &cells_, &have_cell_);
+    }
+    LL_ASSIGN_OR_RETURN(auto refs, decode_chunk_refs(blob));
+    if (task.kind == "relight") return place(task.kind, argument, std::move(refs), &relight_, &have_relight_);
+    if (task.kind == "surfaces") return place(task.kind, argument, std::move(refs), &surfaces_, &have_surface_);
+    return bad("it has a task of the unknown kind '" + printable(task.kind) + "'");
+  }
+
+  absl::StatusOr<Manifest> finish() const {
+    LL_RETURN_IF_ERROR(complete("cell", have_cell_));
+    LL_RETURN_IF_ERROR(complete("relight", have_relight_));
+    LL_RETURN_IF_ERROR(complete("surfaces", have_surface_));
+    return c_.session.manifest(cells_, relight_, surfaces_);
+  }
+
+ private:
+  static absl::Status bad(const std::string& why) {
+    return absl::InvalidArgumentError("cannot assemble from this task list: " + why +
+                                      "; list every task of stage 1 once, with its outputs");
+  }
+
+  template <class T>
+  static absl::Status place(std::string_view kind, const TaskArgument& argument, std::vector<T> results,
+                            std::vector<T>* all, std::vector<bool>* have) {
+    if (argument.first > all->size() || argument.count > all->size() - argument.first ||
+        results.size() != argument.count) {
+      return bad("what its task '" + std::string(kind) + "' gave does not fit the plan");
+    }
+    for (uint32_t i = 0; i < argument.count; ++i) {
+      const size_t at = size_t{argument.first} + i;
+      if ((*have)[at]) return bad("it has " + std::string(kind) + " " + std::to_string(at) + " twice");
+      (*have)[at] = true;
+      (*all)[at] = std::move(results[i]);
+    }
+    return absl::OkStatus();
+  }
+
+  static absl::Status complete(std::string_view kind, const std::vector<bool>& have) {
+    const auto hole = std::find(have.begin(), have.end(), false);
+    if (hole == have.end()) return absl::OkStatus();
+    return bad("it lacks " + std::string(kind) + " " + std::to_string(hole - have.begin()));
+  }
+
+  const Context& c_;
+  std::vector<CellRecord> cells_;
+  std::vector<ChunkRef> relight_, surfaces_;
+  std::vector<bool> have_cell_, have_relight_, have_surface_;
+};
+
+absl::StatusOr<TaskOutput> run_assemble(const Context& c) {
+  LL_ASSIGN_OR_RETURN(const auto bytes, fetch(&c.blobs, c.task.inputs, "the task list"));
+  LL_ASSIGN_OR_RETURN(const auto tasks, decode_task_list(bytes));
+  Assembly assembly(c);
+  for (size_t i = 0; i < tasks.size(); ++i) {
+    if (cancelled(c.control)) return absl::CancelledError("task 'assemble' cancelled");
+    LL_RETURN_IF_ERROR(assembly.add(tasks[i]));
+    c.report(i + 1, tasks.size(), 0);
+  }
+  LL_ASSIGN_OR_RETURN(const Manifest manifest, assembly.finish());
+  TaskOutput out;
+  LL_ASSIGN_OR_RETURN(const Digest blob, c.blobs.put(encode_manifest(manifest)));
+  out.outputs.push_back(blob);
+  return out;
+}
+
+struct Kind {
+  std::string_view name;
+  absl::StatusOr<TaskOutput> (*run)(const Context&);
+};
+constexpr std::array<Kind, 5> kKinds{{{"plan", run_plan},
+                                      {"cell", run_cell},
+                                      {"relight", run_relight},
+                                      {"surfaces", run_surfaces},
+                                      {"assemble", run_assemble}}};
+
+absl::Status unknown_kind(std::string_view kind) {
+  std::string known;
+  for (const Kind& k : kKinds) known.append(" ").append(k.name);
+  return absl::InvalidArgumentError("task kind '" + printable(kind) + "' is unknown; this worker runs" + known);
+}
+
+/// Of the task, checked against the worker's own plan: were they to differ, so would the outputs.
+absl::StatusOr<TaskArgument> argument_of(const BakeTask& task, const BakeSession& session) {
+  if (task.kind == "plan") {
+    if (task.argument.empty()) return TaskArgument{};
+    return absl::InvalidArgumentError("task 'plan' has an argument; submit it without one");
+  }
+  LL_ASSIGN_OR_RETURN(const TaskArgument argument, decode_argument(task.argument));
+  if (argument.plan != session.plan_digest()) {
+    return absl::FailedPreconditionError("this worker plans the bake otherwise (" + session.plan_digest().hex() +
+                                         ") than its job (" + argument.plan.hex() +
+                                         "); use workers of one release, and submit the bake again");
+  }
+  return argument;
+}
+
+}  // namespace
+
+struct TaskRunner::Warm {
+  Digest payload;
+  std::shared_ptr<const BakeSession> session;  // null while it is being made
+};
+
+SpawnedTask first_task() { return {"plan", 0, {}, 0}; }
+
+TaskRunner::TaskRunner(BlobAccess* blobs, size_t sessions) : blobs_(*blobs), sessions_(std::max<size_t>(sessions, 1)) {}
+
+TaskRunner::~TaskRunner() = default;
+
+absl::StatusOr<TaskOutput> TaskRunner::run(const BakeTask& task, const BakeControl& control) {
+  const auto kind = std::find_if(kKinds.begin(), kKinds.end(), [&](const Kind& k) { return k.name == task.kind; });
+  if (kind == kKinds.end()) return unknown_kind(task.kind);
+  LL_ASSIGN_OR_RETURN(const auto session, session_of(task, control));
+  LL_ASSIGN_OR_RETURN(const TaskArgument argument, argument_of(task, *session));
+  return kind->run({*session, blobs_, task, argument, control});
+}
+
+absl::StatusOr<std::shared_ptr<const BakeSession>> TaskRunner::session_of(const BakeTask& task,
+                                                                          const BakeControl& control) {
+  const Digest payload = sha256(task.payload);
+  std::unique_lock lock(mutex_);
+  const auto place = [&] {
+    return std::find_if(warm_.begin(), warm_.end(), [&](const auto& w) { return w->payload == payload; });
+  };
+
+  // One task makes the session. Others wait, and try by themselves if that fails: it may have been cancelled.
+  for (auto at = place(); at != warm_.end(); at = place()) {
+    std::rotate(warm_.begin(), at, at + 1);
+    if (warm_.front()->session != nullptr) return warm_.front()->session;
+    made_.wait_for(lock, std::chrono::milliseconds(50));
+    if (cancelled(control)) return absl::CancelledError("task '" + task.kind + "' cancelled");
+  }
+  if (warm_.size() >= sessions_) {  // who still works with the one that goes keeps it alive
+    const auto last = std::find_if(warm_.rbegin(), warm_.rend(), [](const auto& w) { return w->session != nullptr; });
+    if (last != warm_.rend()) warm_.erase(last.base() - 1);
+  }
+  const auto warm = std::make_shared<Warm>(Warm{payload, nullptr});
+  warm_.insert(warm_.begin(), warm);
+  lock.unlock();
+
+  const auto settle = [&](std::shared_ptr<const BakeSession> session) {
+    lock.lock();
+    if (session == nullptr) std::erase(warm_, warm);
+    warm->session = std::move(session);
+    made_.notify_all();
+  };
+  try {
+    auto session = make_session(task, control);
+    settle(session.ok() ? *session : nullptr);
+    return session;
+  } catch (...) {
+    settle(nullptr);
+    throw;
+  }
+}
+
+absl::StatusOr<std::shared_ptr<const BakeSession>> TaskRunner::make_session(const BakeTask& task,
+                                                                            const BakeControl& control) {
+  LL_ASSIGN_OR_RETURN(const BakePayload payload, decode_payload(task.payload));
+  LL_ASSIGN_OR_RETURN(const auto glb, fetch(&blobs_, payload.scene, "the level"));
+  LL_ASSIGN_OR_RETURN(Scene scene, load_glb(glb));
+  LL_ASSIGN_OR_RETURN(auto session, BakeSession::create(std::move(scene), payload.params, control));
+  return std::shared_ptr<const BakeSession>(std::move(session));
+}
+
+}  // namespace lightloom

@@ -1,0 +1,153 @@
+#include "proto/client.h"
+
+#include <grpcpp/grpcpp.h>
+
+#include <algorithm>
+#include <condition_variable>
+#include <mutex>
+
+#include "core/base/text.h"
+#include "proto/blob_service.grpc.pb.h"
+
+namespace lightloom {
+namespace {
+
+constexpr size_t kPiece = size_t{1} << 20;
+constexpr size_t kMostDigests = 8192;
+
+std::string bytes_of(const Digest& digest) { return {digest.bytes.begin(), digest.bytes.end()}; }
+
+absl::StatusOr<Digest> digest_of(const std::string& bytes) {
+  Digest out;
+  if (bytes.size() != out.bytes.size()) return absl::InternalError("the server sent a digest that is none");
+  std::copy(bytes.begin(), bytes.end(), out.bytes.begin());
+  return out;
+}
+
+/// Another try may find the server there, or the upload where it is.
+bool is_worth_another_try(const grpc::Status& status) {
+  switch (status.error_code()) {
+    case grpc::StatusCode::UNAVAILABLE:
+    case grpc::StatusCode::DEADLINE_EXCEEDED:
+    case grpc::StatusCode::ABORTED:
+    case grpc::StatusCode::DATA_LOSS:
+      return true;
+    default:
+      return false;
+  }
+}
+
+}  // namespace
+
+std::shared_ptr<grpc::Channel> dial(const std::string& address) {
+  grpc::ChannelArguments arguments;
+  arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
+  // A server that comes back is found within a second.
+  arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 200);
+  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1000);
+  // A connection whose other end is gone without a word is noticed.
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, 20'000);
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 10'000);
+  return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
+}
+
+absl::Status from_grpc(const grpc::Status& status) {
+  if (status.ok()) return absl::OkStatus();
+  if (status.error_code() == grpc::StatusCode::UNIMPLEMENTED) {
+    return absl::UnimplementedError("what answers there is no lightloom-server of this protocol; check the address");
+  }
+  return {static_cast<absl::StatusCode>(status.error_code()), printable(status.error_message(), 500)};
+}
+
+absl::Status call_with_retries(const Patience& patience,
+                               const std::function<grpc::Status(grpc::ClientContext*)>& call) {
+  const auto end = std::chrono::steady_clock::now() + patience.total;
+  auto pause = std::chrono::milliseconds(50);
+  for (;;) {
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + patience.call);
+    const grpc::Status status = call(&context);
+    const auto now = std::chrono::steady_clock::now();
+    if (!is_worth_another_try(status) || now + pause > end || (patience.give_up && patience.give_up())) {
+      return from_grpc(status);
+    }
+    std::mutex mutex;
+    std::unique_lock lock(mutex);
+    std::condition_variable().wait_for(lock, pause);
+    pause = std::min(2 * pause, std::chrono::milliseconds(1000));
+  }
+}
+
+absl::StatusOr<std::vector<Digest>> BlobClient::find_missing(std::span<const Digest> digests) const {
+  const auto stub = v1::BlobService::NewStub(channel_);
+  std::vector<Digest> missing;
+  for (size_t first = 0; first < digests.size(); first += kMostDigests) {
+    v1::FindMissingRequest request;
+    for (const Digest& d : digests.subspan(first, std::min(kMostDigests, digests.size() - first))) {
+      request.add_digests(bytes_of(d));
+    }
+    v1::FindMissingResponse response;
+    LL_RETURN_IF_ERROR(call_with_retries(
+        patience_, [&](grpc::ClientContext* context) { return stub->FindMissing(context, request, &response); }));
+    for (const std::string& d : response.digests()) {
+      LL_ASSIGN_OR_RETURN(missing.emplace_back(), digest_of(d));
+    }
+  }
+  return missing;
+}
+
+absl::StatusOr<Digest> BlobClient::upload(std::span<const uint8_t> bytes,
+                                          const std::function<void(uint64_t)>& progress) const {
+  const auto stub = v1::BlobService::NewStub(channel_);
+  const Digest digest = sha256(bytes);
+  LL_RETURN_IF_ERROR(call_with_retries(patience_, [&](grpc::ClientContext* context) {
+    v1::GetUploadRequest question;
+    question.set_digest(bytes_of(digest));
+    v1::GetUploadResponse there;
+    if (const grpc::Status status = stub->GetUpload(context, question, &there); !status.ok()) return status;
+    if (there.complete()) return grpc::Status::OK;
+
+    grpc::ClientContext stream;
+    stream.set_deadline(std::chrono::system_clock::now() + patience_.call + std::chrono::seconds(bytes.size() >> 20));
+    v1::WriteResponse response;
+    const auto writer = stub->Write(&stream, &response);
+    size_t at = std::min<size_t>(there.offset(), bytes.size());
+    v1::WriteRequest piece;
+    piece.set_digest(bytes_of(digest));
+    piece.set_size(bytes.size());
+    piece.set_offset(at);
+    do {
+      const auto data = bytes.subspan(at, std::min(kPiece, bytes.size() - at));
+      piece.set_data(data.data(), data.size());
+      if (!writer->Write(piece)) break;
+      at += data.size();
+      if (progress) progress(at);
+      piece.Clear();
+    } while (at < bytes.size());
+    writer->WritesDone();
+    return writer->Finish();
+  }));
+  return digest;
+}
+
+absl::StatusOr<std::vector<uint8_t>> BlobClient::download(const Digest& digest) const {
+  const auto stub = v1::BlobService::NewStub(channel_);
+  std::vector<uint8_t> bytes;
+  LL_RETURN_IF_ERROR(call_with_retries(patience_, [&](grpc::ClientContext* context) {
+    v1::ReadRequest request;
+    request.set_digest(bytes_of(digest));
+    request.set_offset(bytes.size());  // a cut download goes on
+    const auto reader = stub->Read(context, request);
+    v1::ReadResponse piece;
+    while (reader->Read(&piece)) bytes.insert(bytes.end(), piece.data().begin(), piece.data().end());
+    const grpc::Status status = reader->Finish();
+    if (status.ok() && sha256(bytes) != digest) {
+      bytes.clear();
+      return grpc::Status(grpc::StatusCode::DATA_LOSS, "blob " + digest.hex() + " arrived with other bytes");
+    }
+    return status;
+  }));
+  return bytes;
+}
+
+}  // namespace lightloom

@@ -1,0 +1,75 @@
+// What the tests of Store share: its implementations, and small jobs.
+#pragma once
+
+#include <absl/strings/str_cat.h>
+#include <gtest/gtest.h>
+#include <stdlib.h>
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include "bake-server/store/sqlite_store.h"
+#include "bake-server/store/store.h"
+
+namespace lightloom::test {
+
+/// A folder of this test alone; removed with its content at the end.
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    std::string name = (std::filesystem::temp_directory_path() / "lightloom-store-XXXXXX").string();
+    if (mkdtemp(name.data()) == nullptr) ADD_FAILURE() << "cannot make " << name;
+    path_ = name;
+  }
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+/// An implementation; opening the same folder again finds what was there.
+struct StoreBackend {
+  std::string name;
+  std::function<absl::StatusOr<std::unique_ptr<Store>>(const std::filesystem::path&)> open;
+};
+inline void PrintTo(const StoreBackend& backend, std::ostream* out) { *out << backend.name; }
+
+inline std::vector<StoreBackend> store_backends() { return {{"Sqlite", open_sqlite_store}}; }
+
+/// The value; an error fails the test and gives an empty one.
+template <class T>
+T value(absl::StatusOr<T> result) {
+  EXPECT_TRUE(result.ok()) << result.status();
+  return result.ok() ? *std::move(result) : T{};
+}
+inline void value(const absl::Status& status) { EXPECT_TRUE(status.ok()) << status; }
+
+inline Digest digest(int64_t number) { return sha256(absl::StrCat("output ", number)); }
+
+inline NewTask cell(uint32_t stage, int64_t order) { return {"cell", stage, absl::StrCat("argument ", order), order}; }
+
+inline NewJob new_job(const std::string& request_id, std::vector<NewTask> tasks) {
+  NewJob job;
+  job.request_id = request_id;
+  job.client = "c";
+  job.name = "level";
+  job.tasks = std::move(tasks);
+  return job;
+}
+
+/// tasks, ready, running, done, failed.
+inline std::vector<uint64_t> counts(const Job& job) {
+  return {job.tasks, job.ready, job.running, job.done, job.failed};
+}
+
+}  // namespace lightloom::test
