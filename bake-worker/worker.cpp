@@ -44,6 +44,7 @@ Worker::Worker(std::shared_ptr<grpc::Channel> channel, WorkerOptions options)
       options_(std::move(options)),
       blobs_(remote_blobs(channel_)),
       runner_(blobs_.get(), options_.sessions) {
+  if (options_.session != nullptr) runner_.adopt(options_.payload, options_.session);
   std::random_device random;
   incarnation_ = uint64_t{random()} << 32 | random() | 1;
   for (uint32_t i = 0; i < options_.who.threads; ++i) threads_.emplace_back([this] { execute(); });

@@ -27,6 +27,9 @@ struct WorkerOptions {
   std::string name;     ///< [A-Za-z0-9._-], 1 to 64; stays the same when the process restarts
   Introduction who;     ///< who.threads: tasks at once
   size_t sessions = 2;  ///< levels that are kept warm
+  /// A level that is at hand, and the payload of its tasks; may be null.
+  std::vector<uint8_t> payload = {};
+  std::shared_ptr<const BakeSession> session = nullptr;
 };
 
 /// Blobs on the server, to a TaskRunner.

@@ -11,6 +11,7 @@
 #include "cli/files.h"
 #include "cli/interrupt.h"
 #include "cli/level.h"
+#include "cli/local_bake.h"
 #include "cli/print_json.h"
 #include "cli/progress.h"
 #include "core/bake/bake.h"
@@ -98,7 +99,7 @@ absl::Status run(const Options& o) {
   control.progress = [&](const std::string& stage, uint64_t done, uint64_t total, uint64_t rays) {
     bar.update(stage, done, total, rays);
   };
-  LL_ASSIGN_OR_RETURN(const BakeReport report, bake(*level.tracer, o.how.params, o.output, control));
+  LL_ASSIGN_OR_RETURN(const BakeReport report, local_bake(*level.tracer, o.how.params, o.output, control));
   bar.finish();
   if (o.json) {
     print_json(to_json(report));

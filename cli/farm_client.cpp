@@ -73,8 +73,8 @@ std::string new_request_id() {
 }  // namespace
 
 struct FarmClient::Connection {
-  explicit Connection(const std::string& server)
-      : channel(dial(server)), jobs(v1::JobService::NewStub(channel)), blobs(channel) {}
+  explicit Connection(std::shared_ptr<grpc::Channel> to)
+      : channel(std::move(to)), jobs(v1::JobService::NewStub(channel)), blobs(channel) {}
   std::shared_ptr<grpc::Channel> channel;
   std::unique_ptr<v1::JobService::Stub> jobs;
   BlobClient blobs;
@@ -87,8 +87,9 @@ struct FarmClient::Connection {
   }
 };
 
-FarmClient::FarmClient(const std::string& server)
-    : server_(server), connection_(std::make_unique<Connection>(server)) {}
+FarmClient::FarmClient(const std::string& server) : FarmClient(dial(server), server) {}
+FarmClient::FarmClient(std::shared_ptr<grpc::Channel> channel, std::string server)
+    : server_(std::move(server)), connection_(std::make_unique<Connection>(std::move(channel))) {}
 FarmClient::~FarmClient() = default;
 
 absl::Status FarmClient::in_words(const absl::Status& status) const {
@@ -115,16 +116,21 @@ absl::StatusOr<RemoteJob> FarmClient::submit(std::span<const uint8_t> scene, con
   const auto digest = connection_->blobs.upload(scene, progress);
   if (!digest.ok()) return in_words(digest.status());
 
+  return submit(new_request_id(), encode_payload({*digest, params}), {*digest}, name, priority);
+}
+
+absl::StatusOr<RemoteJob> FarmClient::submit(const std::string& request_id, std::span<const uint8_t> payload,
+                                             const std::vector<Digest>& inputs, const std::string& name,
+                                             int32_t priority) {
   v1::SubmitRequest request;
-  request.set_request_id(new_request_id());
+  request.set_request_id(request_id);
   const char* user = std::getenv("USER");
-  request.set_client(printable(user != nullptr ? user : "", 64));
-  request.set_name(name.substr(0, 256));
+  request.set_client(printable(user != nullptr ? user : "", 48));
+  request.set_name(printable(name, 200));
   request.set_priority(priority);
   request.set_method_version(std::string(kMethodVersion));
-  const std::vector<uint8_t> payload = encode_payload({*digest, params});
   request.set_payload(payload.data(), payload.size());
-  request.add_inputs(bytes_of(*digest));
+  for (const Digest& input : inputs) request.add_inputs(bytes_of(input));
   const SpawnedTask first = first_task();
   auto* task = request.add_tasks();
   task->set_kind(first.kind);

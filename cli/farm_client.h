@@ -12,6 +12,10 @@
 #include "core/base/parallel.h"
 #include "core/base/status.h"
 
+namespace grpc {
+class Channel;
+}
+
 namespace lightloom {
 
 struct RemoteJob {
@@ -47,8 +51,13 @@ struct RemoteEvent {
 class FarmClient {
  public:
   explicit FarmClient(const std::string& server);
+  /// Over a channel that is at hand; `server` names it in errors.
+  FarmClient(std::shared_ptr<grpc::Channel> channel, std::string server);
   ~FarmClient();
 
+  /// A job of this payload, whose input blobs are there. The same request id again is the same job.
+  absl::StatusOr<RemoteJob> submit(const std::string& request_id, std::span<const uint8_t> payload,
+                                   const std::vector<Digest>& inputs, const std::string& name, int32_t priority);
   /// Uploads the level, unless it is there, and submits its bake. `progress`: bytes of `scene` that are there.
   absl::StatusOr<RemoteJob> submit(std::span<const uint8_t> scene, const BakeParams& params, const std::string& name,
                                    int32_t priority, const std::function<void(uint64_t)>& progress);

@@ -27,6 +27,19 @@ void log_for_debugging(gpr_log_func_args* entry) { spdlog::debug("gRPC: {}", ent
 }  // namespace
 
 struct Server::Parts {
+  Parts(const ServerInfo& info, Farm* its_farm, grpc::ServerBuilder* builder) : farm(its_farm) {
+    gpr_set_log_function(log_for_debugging);
+    grpc::EnableDefaultHealthCheckService(true);
+    // Without this two servers share a port on Linux, and each gets some of the workers.
+    builder->AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+    builder->SetMaxReceiveMessageSize(kMaxMessageBytes);
+    services.push_back(make_job_service(info, &farm->coordinator()));
+    services.push_back(make_worker_service(info, &farm->coordinator()));
+    services.push_back(make_blob_service(&farm->blobs()));
+    for (const auto& service : services) builder->RegisterService(service.get());
+    server = builder->BuildAndStart();
+  }
+
   Farm* farm;
   std::vector<std::unique_ptr<grpc::Service>> services;
   std::unique_ptr<grpc::Server> server;  // last: it stops before the services that it calls
@@ -34,27 +47,23 @@ struct Server::Parts {
 
 absl::StatusOr<std::unique_ptr<Server>> Server::start(const std::string& address, const ServerInfo& info, Farm* farm) {
   LL_RETURN_IF_ERROR(check_listen_address(address));
-  gpr_set_log_function(log_for_debugging);
-  auto parts = std::make_unique<Parts>();
-  parts->farm = farm;
-  grpc::EnableDefaultHealthCheckService(true);
   grpc::ServerBuilder builder;
-  // Without this two servers share a port on Linux, and each gets some of the workers.
-  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
-  builder.SetMaxReceiveMessageSize(kMaxMessageBytes);
-  parts->services.push_back(make_job_service(info, &farm->coordinator()));
-  parts->services.push_back(make_worker_service(info, &farm->coordinator()));
-  parts->services.push_back(make_blob_service(&farm->blobs()));
-  for (const auto& service : parts->services) builder.RegisterService(service.get());
   int port = 0;
   builder.AddListeningPort(address, grpc::InsecureServerCredentials(), &port);
-  parts->server = builder.BuildAndStart();
+  auto parts = std::make_unique<Parts>(info, farm, &builder);
   if (parts->server == nullptr || port == 0) {
     return absl::UnavailableError(
         absl::StrCat("cannot listen on ", address, ": the port is in use or not allowed: choose another"));
   }
   std::string taken = absl::StrCat(address.substr(0, address.rfind(':')), ":", port);
   return std::unique_ptr<Server>(new Server(std::move(parts), std::move(taken)));
+}
+
+absl::StatusOr<std::unique_ptr<Server>> Server::start_in_process(const ServerInfo& info, Farm* farm) {
+  grpc::ServerBuilder builder;
+  auto parts = std::make_unique<Parts>(info, farm, &builder);
+  if (parts->server == nullptr) return absl::InternalError("gRPC does not start in this process; see its log");
+  return std::unique_ptr<Server>(new Server(std::move(parts), "in this process"));
 }
 
 Server::Server(std::unique_ptr<Parts> parts, std::string address)

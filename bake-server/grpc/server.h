@@ -21,6 +21,9 @@ class Server {
   /// Errors: a bad address, a port in use. `farm` must outlive the server, whose end stops its coordinator.
   static absl::StatusOr<std::unique_ptr<Server>> start(const std::string& address, const ServerInfo& info, Farm* farm);
 
+  /// Serves this process only, by in_process_channel().
+  static absl::StatusOr<std::unique_ptr<Server>> start_in_process(const ServerInfo& info, Farm* farm);
+
   /// Calls that still run get a second to end, then they are cancelled.
   ~Server();
   Server(const Server&) = delete;

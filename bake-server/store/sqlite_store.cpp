@@ -552,15 +552,18 @@ class SqliteStore final : public Store {
   absl::Status advance(JobId job, int64_t now_ms) {
     int64_t failed = 0;
     int64_t blocked = 0;
+    int64_t done = 0;
     {
       Query query = db_->query(
-          "SELECT ready + running, failed, tasks - ready - running - done - failed FROM progress WHERE job = ?1", job);
+          "SELECT ready + running, failed, tasks - ready - running - done - failed, done FROM progress WHERE job = ?1",
+          job);
       LL_RETURN_IF_ERROR(query.step().status());
       if (query.integer(0) > 0) return absl::OkStatus();
       failed = query.integer(1);
       blocked = query.integer(2);
+      done = query.integer(3);
     }
-    if (failed > 0) return end(job, blocked > 0 ? JobState::kFailed : JobState::kPartial, now_ms);
+    if (failed > 0) return end(job, blocked > 0 || done == 0 ? JobState::kFailed : JobState::kPartial, now_ms);
     if (blocked == 0) return end(job, JobState::kDone, now_ms);
     LL_RETURN_IF_ERROR(db_->run("UPDATE progress SET open_stage = (SELECT MIN(stage) FROM tasks"
                                 " WHERE job = ?1 AND stage > open_stage) WHERE job = ?1",

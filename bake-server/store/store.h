@@ -15,12 +15,12 @@ namespace lightloom {
 using JobId = int64_t;   ///< 1 or more, never given twice; grows with the time of submission
 using TaskId = int64_t;  ///< 1 or more, never given twice
 
-// Implementations store the numbers of both enums: never renumber.
+// Implementations store the numbers: never renumber.
 enum class JobState {
   kRunning = 0,
   kDone = 1,
   kPartial = 2,    ///< ended; some tasks of the last stage failed for good, the other outputs are there
-  kFailed = 3,     ///< ended; failed tasks kept a later stage from opening
+  kFailed = 3,     ///< ended; failed tasks kept a later stage from opening, or nothing was done at all
   kCancelled = 4,  ///< ended by cancel()
 };
 
@@ -193,7 +193,7 @@ class Store {
                                               const std::vector<NewTask>& spawned, int64_t now_ms) = 0;
   /// Ends the attempt; false if it was not live, and nothing changed. The task fails for good with its max_failures-th
   /// failed attempt, which ends its other attempts. Other tasks of its stage go on; when none is ready or running, the
-  /// job ends: kFailed if tasks of later stages wait, else kPartial.
+  /// job ends: kFailed if tasks of later stages wait or none is done, else kPartial.
   virtual absl::StatusOr<bool> fail(const std::string& token, const std::string& reason, int64_t now_ms,
                                     uint32_t max_failures) = 0;
 

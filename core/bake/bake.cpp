@@ -1,11 +1,15 @@
 #include "core/bake/bake.h"
 
+#include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <mutex>
 
 #include "core/asset/asset.h"
 #include "core/bake/assemble.h"
 #include "core/bake/session.h"
+#include "core/base/half.h"
+#include "core/base/sh.h"
 #include "core/base/stopwatch.h"
 
 namespace lightloom {
@@ -37,29 +41,45 @@ absl::Status cancelled(const std::filesystem::path& loom) {
                               (old ? " still holds the earlier bake, whole" : " holds no asset yet: bake again"));
 }
 
-void add_cell(const CellRecord& c, BakeReport* report) {
-  report->rays_gather += c.gather_rays;
-  report->unseen += c.unseen;
-  report->clusters += c.clusters.size();
-  report->coefficients += static_cast<double>(c.coefficients);
-  report->bytes_projection += c.bytes_projection;
-  report->bytes_reconstruction += c.bytes_reconstruction;
-}
-
 }  // namespace
+
+BakeReport report_of(const Manifest& m) {
+  BakeReport r;
+  r.probes = m.probes.size();
+  r.cells = m.cells.size();
+  r.clusters = m.clusters.size();
+  r.repairs = static_cast<uint64_t>(std::count_if(m.probes.begin(), m.probes.end(), [&](const ProbeEntry& p) {
+    return m.params.method == BakeMethod::kDefault && p.slot > 0;
+  }));
+  r.rays_relight = r.probes * static_cast<uint64_t>(m.params.relight_rays);
+  double coefficients = 0;
+  for (const CellEntry& c : m.cells) {
+    const uint64_t rays = uint64_t{c.receivers} * static_cast<uint64_t>(m.params.rays);
+    r.receivers += c.receivers;
+    r.rays_gather += rays;
+    r.unseen += static_cast<uint64_t>(std::llround(static_cast<double>(c.unseen) * static_cast<double>(rays)));
+    r.bytes_total += c.chunk.size;
+    r.bytes_reconstruction += c.receivers * sizeof(uint16_t);
+  }
+  for (const ClusterEntry& k : m.clusters) {
+    coefficients += static_cast<double>(k.rank) * k.receivers;
+    const uint64_t stride = static_cast<uint64_t>(sh_stride(m.params.order)), padded = (k.receivers + 7) / 8 * 8;
+    r.bytes_projection += k.rank * (k.probes * stride * sizeof(Half) + sizeof(float));
+    r.bytes_reconstruction += k.rank * padded * sizeof(Half);
+  }
+  for (const ProbeEntry& p : m.probes) r.bytes_relight += p.relight.size;
+  for (const ObjectEntry& o : m.objects) r.bytes_total += o.surface.size;
+  r.bytes_total += r.bytes_relight + encode_manifest(m).size();
+  if (r.receivers > 0) r.coefficients = coefficients / static_cast<double>(r.receivers);
+  return r;
+}
 
 absl::StatusOr<BakeReport> bake(const RayTracer& tracer, const BakeParams& params, const std::filesystem::path& loom,
                                 const BakeControl& control) {
   const Stopwatch watch;
-  BakeReport report;
   LL_ASSIGN_OR_RETURN(const auto session, BakeSession::create(tracer, params, control));
+  const double seconds_plan = watch.seconds();
   const Plan& plan = session->plan();
-  report.seconds_plan = watch.seconds();
-  report.seconds_receivers = plan.seconds_receivers;
-  report.seconds_probes = plan.seconds_probes;
-  report.receivers = plan.receivers.all.size();
-  report.repairs = plan.placement.repairs;
-  report.cells = plan.cells.size();
 
   const ChunkStore store = chunk_store(loom);
   std::atomic<double> seconds_write{0};
@@ -76,14 +96,11 @@ absl::StatusOr<BakeReport> bake(const RayTracer& tracer, const BakeParams& param
     return error.status();
   };
 
-  const Stopwatch cells_watch;
   std::vector<CellRecord> cells(plan.cells.size());
-  std::mutex mutex;  // guards the next two
-  double transport = 0, compress = 0;
   Parallel cell_stage = control.stage("cells");
   if (control.progress) {
     cell_stage.progress = [&](uint64_t finished, uint64_t total) {
-      control.progress("cells", finished, total, session->cell_rays());
+      control.progress("cells", finished, total, session->spent().cell_rays());
     };
   }
   bool done = parallel_for(cells.size(), cell_stage, [&](uint64_t i) {
@@ -91,24 +108,11 @@ absl::StatusOr<BakeReport> bake(const RayTracer& tracer, const BakeParams& param
     auto cell = session->cell(i, sink, control.cancel);
     if (!cell.ok()) return error.note(cell.status());
     cells[i] = std::move(cell->record);
-    const std::lock_guard lock(mutex);
-    transport += cell->transport_seconds;
-    compress += cell->compress_seconds;
   });
   LL_RETURN_IF_ERROR(outcome(done));
-  for (const CellRecord& c : cells) add_cell(c, &report);
-  report.rays_visibility = session->cell_rays() - report.rays_gather;
-  // The threads' shares of the stage's wall time.
-  const double cells_seconds = cells_watch.seconds();
-  if (transport + compress > 0) {
-    report.seconds_transport = cells_seconds * transport / (transport + compress);
-    report.seconds_compress = cells_seconds - report.seconds_transport;
-  }
 
   // Probes that no cell reads need no relight sets.
   const std::vector<uint32_t> used = used_probes(cells);
-  report.probes = used.size();
-  const Stopwatch relight_watch;
   std::vector<ChunkRef> relight(plan.placement.probes.size());
   done = parallel_for(used.size(), control.stage("relight rays"), [&](uint64_t i) {
     if (error.failed()) return;
@@ -117,23 +121,30 @@ absl::StatusOr<BakeReport> bake(const RayTracer& tracer, const BakeParams& param
     relight[used[i]] = refs->front();
   });
   LL_RETURN_IF_ERROR(outcome(done));
-  report.seconds_relight = relight_watch.seconds();
-  report.rays_relight = used.size() * static_cast<uint64_t>(plan.params.relight_rays);
   std::vector<ChunkRef> surfaces(session->scene().objects.size());
   for (size_t o = 0; o < surfaces.size(); ++o) {
     LL_ASSIGN_OR_RETURN(surfaces[o], session->surface(o, sink));
   }
-  report.seconds_write = seconds_write;
 
   LL_ASSIGN_OR_RETURN(const Manifest manifest, session->manifest(cells, relight, surfaces));
   LL_RETURN_IF_ERROR(write_manifest(loom, manifest));
-  for (const CellRecord& c : cells) report.bytes_total += c.chunk.size;
-  for (const ChunkRef& ref : relight) report.bytes_relight += ref.size;
-  for (const ChunkRef& ref : surfaces) report.bytes_total += ref.size;
-  report.bytes_total += report.bytes_relight + std::filesystem::file_size(loom / "manifest");
-  if (report.receivers > 0) report.coefficients /= static_cast<double>(report.receivers);
+  BakeReport report = report_of(manifest);
+  add_times(*session, control.threads, &report);
+  report.seconds_plan = seconds_plan;
+  report.seconds_write = seconds_write;
   report.seconds_total = watch.seconds();
   return report;
+}
+
+void add_times(const BakeSession& session, int threads, BakeReport* report) {
+  const BakeSession::Spent spent = session.spent();
+  const double share = 1.0 / thread_count(threads);
+  report->rays_visibility = spent.visibility_rays;
+  report->seconds_receivers = session.plan().seconds_receivers;
+  report->seconds_probes = session.plan().seconds_probes;
+  report->seconds_transport = spent.transport_seconds * share;
+  report->seconds_compress = spent.compress_seconds * share;
+  report->seconds_relight = spent.relight_seconds * share;
 }
 
 }  // namespace lightloom

@@ -3,7 +3,9 @@
 
 #include <filesystem>
 
+#include "core/asset/manifest.h"
 #include "core/bake/plan.h"
+#include "core/bake/session.h"
 
 namespace lightloom {
 
@@ -12,12 +14,19 @@ struct BakeReport {
   uint64_t rays_gather = 0, rays_visibility = 0, rays_relight = 0, unseen = 0;
   double coefficients = 0;  ///< mean rank per receiver
   double seconds_total = 0, seconds_plan = 0;
-  double seconds_receivers = 0, seconds_probes = 0;    ///< parts of the plan
-  double seconds_transport = 0, seconds_compress = 0;  ///< wall time of the cell stage, split by its threads' time
-  double seconds_relight = 0, seconds_write = 0;
+  double seconds_receivers = 0, seconds_probes = 0;  ///< parts of the plan
+  /// Thread time ÷ threads.
+  double seconds_transport = 0, seconds_compress = 0, seconds_relight = 0;
+  double seconds_write = 0;
   uint64_t clusters_reused = 0;  ///< taken from an earlier bake; this one bakes every cluster anew
   uint64_t bytes_total = 0, bytes_projection = 0, bytes_reconstruction = 0, bytes_relight = 0;
 };
+
+/// What a finished asset says of its bake; nothing of times, nor of visibility rays.
+BakeReport report_of(const Manifest& manifest);
+
+/// What `session` spent; its threads were so many (0: one per hardware thread).
+void add_times(const BakeSession& session, int threads, BakeReport* report);
 
 /// Bakes into the folder `loom`. The old manifest, if any, stays in force until the new one replaces it whole.
 absl::StatusOr<BakeReport> bake(const RayTracer& tracer, const BakeParams& params, const std::filesystem::path& loom,

@@ -5,6 +5,7 @@
 
 #include "core/bake/assemble.h"
 #include "core/bake/tasks.h"
+#include "core/base/stopwatch.h"
 #include "core/base/version.h"
 
 namespace lightloom {
@@ -96,10 +97,15 @@ absl::StatusOr<BakedCell> BakeSession::cell(size_t index, const ChunkSink& sink,
   if (index >= plan_.cells.size()) return not_planned("cell", index, plan_.cells.size());
   const CellTask task = make_cell_task(plan_, tracer_, plan_.cells[index]);
   LL_ASSIGN_OR_RETURN(const CellResult result, bake_cell(tracer_, cache_.get(), task, cancel));
-  cell_rays_ += result.stats.gather_rays + result.stats.visibility_rays;
+  {
+    const std::lock_guard lock(mutex_);
+    spent_.gather_rays += result.stats.gather_rays;
+    spent_.visibility_rays += result.stats.visibility_rays;
+    spent_.transport_seconds += result.transport_seconds;
+    spent_.compress_seconds += result.compress_seconds;
+  }
   LL_ASSIGN_OR_RETURN(const ChunkRef chunk, sink(encode_cell(result.chunk)));
-  return BakedCell{make_record(result, chunk), result.stats.visibility_rays, result.transport_seconds,
-                   result.compress_seconds};
+  return BakedCell{make_record(result, chunk), result.stats.visibility_rays};
 }
 
 absl::StatusOr<std::vector<ChunkRef>> BakeSession::relight(size_t first, size_t count, const ChunkSink& sink,
@@ -109,13 +115,21 @@ absl::StatusOr<std::vector<ChunkRef>> BakeSession::relight(size_t first, size_t 
     return not_planned("probe", first + count - 1, probes.size());
   }
   std::vector<ChunkRef> refs;
+  const Stopwatch watch;
   for (size_t i = first; i < first + count; ++i) {
     if (cancel != nullptr && cancel->cancelled()) return absl::CancelledError("relight rays cancelled");
     LL_ASSIGN_OR_RETURN(const ChunkRef chunk,
                         sink(encode_relight(bake_relight(tracer_, plan_, search_, probes[i].position))));
     refs.push_back(chunk);
   }
+  const std::lock_guard lock(mutex_);
+  spent_.relight_seconds += watch.seconds();
   return refs;
+}
+
+BakeSession::Spent BakeSession::spent() const {
+  const std::lock_guard lock(mutex_);
+  return spent_;
 }
 
 absl::StatusOr<ChunkRef> BakeSession::surface(size_t object, const ChunkSink& sink) const {

@@ -21,7 +21,6 @@ using ChunkSink = std::function<absl::StatusOr<ChunkRef>(std::span<const uint8_t
 struct BakedCell {
   CellRecord record;
   uint64_t visibility_rays = 0;
-  double transport_seconds = 0, compress_seconds = 0;  ///< thread time
 };
 
 /// Thread-safe after construction. What it returns and stores is a pure function of scene and parameters.

@@ -247,6 +247,11 @@ TaskRunner::TaskRunner(BlobAccess* blobs, size_t sessions) : blobs_(*blobs), ses
 
 TaskRunner::~TaskRunner() = default;
 
+void TaskRunner::adopt(std::span<const uint8_t> payload, std::shared_ptr<const BakeSession> session) {
+  const std::lock_guard lock(mutex_);
+  warm_.insert(warm_.begin(), std::make_shared<Warm>(Warm{sha256(payload), std::move(session)}));
+}
+
 absl::StatusOr<TaskOutput> TaskRunner::run(const BakeTask& task, const BakeControl& control) {
   const auto kind = std::find_if(kKinds.begin(), kKinds.end(), [&](const Kind& k) { return k.name == task.kind; });
   if (kind == kKinds.end()) return unknown_kind(task.kind);

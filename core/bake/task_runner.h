@@ -66,6 +66,9 @@ class TaskRunner {
   explicit TaskRunner(BlobAccess* blobs, size_t sessions = 2);
   ~TaskRunner();
 
+  /// A session that is at hand for tasks of this payload: they read no level blob then.
+  void adopt(std::span<const uint8_t> payload, std::shared_ptr<const BakeSession> session);
+
   /// Reports the stages "receivers" and "probes" where it has to plan first, then "relight", "surfaces", "assemble".
   /// Errors: unknown kind or bytes that cannot be read (InvalidArgument), an index that is not planned (OutOfRange), a
   /// plan or method other than the worker's (FailedPrecondition), cancellation, and those of planning and of `blobs`.

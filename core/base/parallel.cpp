@@ -9,10 +9,12 @@
 
 namespace lightloom {
 
+int thread_count(int threads) {
+  return threads > 0 ? threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
+
 bool parallel_for(uint64_t n, const Parallel& how, const std::function<void(uint64_t)>& body) {
-  const uint64_t wanted =
-      how.threads > 0 ? static_cast<uint64_t>(how.threads) : std::max(1u, std::thread::hardware_concurrency());
-  const uint64_t count = std::min(wanted, std::max<uint64_t>(n, 1));
+  const uint64_t count = std::min(static_cast<uint64_t>(thread_count(how.threads)), std::max<uint64_t>(n, 1));
 
   std::atomic<uint64_t> next{0};
   std::atomic<bool> stop{false};

@@ -17,6 +17,9 @@ class CancelFlag {
   std::atomic<bool> cancelled_{false};
 };
 
+/// Of a setting where 0 means one per hardware thread.
+int thread_count(int threads);
+
 /// How a loop runs. threads = 0 means one per hardware thread; fewer run if the system has no more.
 struct Parallel {
   int threads = 0;

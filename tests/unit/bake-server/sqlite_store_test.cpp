@@ -33,7 +33,7 @@ class SqliteStoreTest : public testing::Test {
   static void TearDownTestSuite() { sqlite3_reset_auto_extension(); }
 
   absl::Status open_error() {
-    const absl::Status status = open_sqlite_store(folder_.path()).status();
+    absl::Status status = open_sqlite_store(folder_.path()).status();
     EXPECT_THAT(std::string(status.message()), Not(HasSubstr("\n")));
     return status;
   }
@@ -114,6 +114,7 @@ TEST_F(SqliteStoreTest, DamagedPagesAreErrors) {
   {
     auto store = value(open_sqlite_store(folder_.path()));
     std::vector<NewTask> tasks;
+    tasks.reserve(500);
     for (int i = 0; i < 500; ++i) tasks.push_back(cell(0, i));
     value(store->submit(new_job("r", tasks), 1));
   }
@@ -172,6 +173,7 @@ int64_t steps_of(const std::function<void()>& call) {
 TEST_F(SqliteStoreTest, ManyQueuedTasksMakeNoCallDearer) {
   const auto measure = [](Store& store, int n) {
     std::vector<NewTask> tasks;
+    tasks.reserve(static_cast<size_t>(n));
     for (int i = 0; i < n; ++i) tasks.push_back(cell(static_cast<uint32_t>(i % 2), i));
     value(store.submit(new_job(absl::StrCat("r", n), tasks), 1));
     for (TaskId task = 1; task <= 9; task += 2) {

@@ -42,7 +42,7 @@ struct StoreBackend {
   std::string name;
   std::function<absl::StatusOr<std::unique_ptr<Store>>(const std::filesystem::path&)> open;
 };
-inline void PrintTo(const StoreBackend& backend, std::ostream* out) { *out << backend.name; }
+inline std::ostream& operator<<(std::ostream& out, const StoreBackend& backend) { return out << backend.name; }
 
 inline std::vector<StoreBackend> store_backends() { return {{"Sqlite", open_sqlite_store}}; }
 

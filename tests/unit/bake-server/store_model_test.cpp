@@ -116,13 +116,15 @@ class StoreModel : public testing::TestWithParam<StoreBackend> {
   void end_if_nothing_is_left(ModelJob& job) {
     bool waiting = false;
     bool failed = false;
+    bool done = false;
     for (const size_t t : job.tasks) {
       if (state(t) == TaskState::kReady) return;
       waiting |= tasks_[t].state == ModelTask::kWaits;
       failed |= tasks_[t].state == ModelTask::kFailed;
+      done |= tasks_[t].state == ModelTask::kDone;
     }
     if (!failed) return end(job, JobState::kDone, "done");
-    waiting ? end(job, JobState::kFailed, "failed") : end(job, JobState::kPartial, "partial");
+    waiting || !done ? end(job, JobState::kFailed, "failed") : end(job, JobState::kPartial, "partial");
   }
 
   void add_task(size_t job, const NewTask& task) {
@@ -392,6 +394,7 @@ class StoreModel : public testing::TestWithParam<StoreBackend> {
     EXPECT_EQ(completions.size(), model_counts(job)[3]) << "job " << job.id;
   }
 
+ protected:
   TemporaryFolder folder_;
   std::unique_ptr<Store> store_;
   std::mt19937_64 random_{2};

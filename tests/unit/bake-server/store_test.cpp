@@ -208,6 +208,7 @@ TEST_P(StoreContract, ATokenNamesOneAttemptForEver) {
 TEST_P(StoreContract, ThreadsNeverGetTheSameTask) {
   constexpr int kTasks = 40;
   std::vector<NewTask> tasks;
+  tasks.reserve(kTasks);
   for (int i = 0; i < kTasks; ++i) tasks.push_back(cell(0, i));
   const JobId id = submit(new_job("r", tasks));
   std::vector<TaskId> ids;
@@ -215,6 +216,7 @@ TEST_P(StoreContract, ThreadsNeverGetTheSameTask) {
   for (const JobView::Ready& ready : views.at(0).ready) ids.push_back(ready.task);
   std::atomic<int> leased = 0;
   std::vector<std::thread> threads;
+  threads.reserve(4);
   for (int worker = 0; worker < 4; ++worker) {
     threads.emplace_back([&, worker] {
       for (const TaskId task : ids) {
@@ -459,6 +461,13 @@ TEST_P(StoreContract, AHoleInTheLastStageMakesTheJobPartial) {
   EXPECT_THAT(ended.outputs, ElementsAre(digest(7)));
   EXPECT_THAT(counts(ended), ElementsAre(2, 0, 0, 1, 1));
   EXPECT_EQ(complete("a", 1), Completion::kJobEnded);
+}
+
+TEST_P(StoreContract, AJobOfWhichNothingIsDoneHasFailed) {
+  const JobId id = submit(new_job("r", {cell(0, 0)}));
+  lease(task_of(id, 0), "w", "a");
+  fail("a", "no level", 1);
+  EXPECT_EQ(job(id).state, JobState::kFailed);
 }
 
 TEST_P(StoreContract, AHoleInALowerStageMakesTheJobFail) {

@@ -1,0 +1,107 @@
+#include "cli/local_bake.h"
+
+#include <filesystem>
+#include <memory>
+#include <thread>
+#include <utility>
+
+#include "bake-server/grpc/server.h"
+#include "bake-worker/worker.h"
+#include "cli/farm_client.h"
+#include "core/base/stopwatch.h"
+#include "core/base/version.h"
+#include "proto/protocol_version.h"
+
+namespace lightloom {
+namespace fs = std::filesystem;
+namespace {
+
+/// A worker and its thread, ended with it.
+class LocalWorker {
+ public:
+  LocalWorker(std::shared_ptr<grpc::Channel> channel, WorkerOptions options)
+      : worker_(std::move(channel), std::move(options)), thread_([this] { (void)worker_.run(); }) {}
+  ~LocalWorker() {
+    worker_.stop();
+    thread_.join();
+  }
+  LocalWorker(const LocalWorker&) = delete;
+  LocalWorker& operator=(const LocalWorker&) = delete;
+
+ private:
+  Worker worker_;
+  std::thread thread_;
+};
+
+absl::Status stopped(const std::string& loom, const RemoteJob& job) {
+  std::error_code error;
+  const bool old = fs::exists(fs::path(loom) / "manifest", error);
+  return absl::CancelledError(
+      "bake stopped; " + loom + (old ? " still holds the earlier bake" : " holds no asset yet") + ", and " +
+      std::to_string(job.done) + " of " + std::to_string(job.tasks) + " tasks are kept: bake again to go on");
+}
+
+/// The job until it ends, or the bake is cancelled.
+absl::StatusOr<RemoteJob> run_job(RemoteJob job, FarmClient* client, std::shared_ptr<grpc::Channel> channel,
+                                  WorkerOptions options, const std::string& loom, const BakeControl& control) {
+  const LocalWorker worker(std::move(channel), std::move(options));
+  const CancelFlag never;
+  const auto end =
+      client->watch(job.id, control.cancel != nullptr ? *control.cancel : never, [&](const RemoteJob& now) {
+        job = now;
+        if (control.progress) control.progress("bake", now.done, now.tasks, now.rays);
+      });
+  if (absl::IsCancelled(end.status())) return stopped(loom, job);
+  return end;
+}
+
+}  // namespace
+
+absl::StatusOr<BakeReport> local_bake(const RayTracer& tracer, const BakeParams& params, const std::string& loom,
+                                      const BakeControl& control) {
+  const Stopwatch watch;
+  LL_ASSIGN_OR_RETURN(const std::shared_ptr<const BakeSession> session, BakeSession::create(tracer, params, control));
+  const double seconds_plan = watch.seconds();
+  // The level is at hand: no blob holds it, and its hash stands for it. Equal payloads are one job.
+  const std::vector<uint8_t> payload = encode_payload({scene_hash(tracer.scene()), params});
+  const std::string request_id = sha256(payload).hex();
+
+  const std::string state = loom + ".partial";
+  LL_ASSIGN_OR_RETURN(auto farm, Farm::open(state));
+  const ServerInfo info{std::string(kVersion), kProtocolVersion, std::string(kMethodVersion)};
+  LL_ASSIGN_OR_RETURN(auto server, Server::start_in_process(info, farm.get()));
+  FarmClient client(server->in_process_channel(), state);
+  LL_ASSIGN_OR_RETURN(const std::vector<RemoteJob> earlier, client.jobs());
+  LL_ASSIGN_OR_RETURN(RemoteJob job, client.submit(request_id, payload, {}, loom, 0));
+  for (const RemoteJob& other : earlier) {  // of another level, or other parameters
+    if (other.id != job.id && !other.ended()) LL_RETURN_IF_ERROR(client.cancel(other.id).status());
+  }
+  if (!job.ended()) {
+    const auto threads = static_cast<uint32_t>(thread_count(control.threads));
+    WorkerOptions options{"this", introduce_this_machine(threads), 1, payload, session};
+    LL_ASSIGN_OR_RETURN(
+        job, run_job(std::move(job), &client, server->in_process_channel(), std::move(options), loom, control));
+  }
+  const auto forget = [&] {
+    server.reset();
+    farm.reset();
+    std::error_code ignored;
+    fs::remove_all(state, ignored);
+  };
+  if (job.state != "done") {
+    forget();  // the same again would find the same failure
+    return absl::AbortedError(job.error.empty() ? "the bake ended " + job.state : job.error);
+  }
+  const Stopwatch write_watch;
+  const CancelFlag never;
+  LL_ASSIGN_OR_RETURN(const Manifest manifest, client.fetch(job.id, loom, never, [](uint64_t, uint64_t) {}));
+  BakeReport report = report_of(manifest);
+  add_times(*session, control.threads, &report);
+  report.seconds_plan = seconds_plan;
+  report.seconds_write = write_watch.seconds();
+  forget();
+  report.seconds_total = watch.seconds();
+  return report;
+}
+
+}  // namespace lightloom
