@@ -224,21 +224,41 @@ TEST_F(CommandLine, TheDecoderHasNoTimesAndSimdHas) {
   fails(2, simd, "--device vulkan");
 }
 
-TEST_F(CommandLine, AnInterruptedBakeSaysWhatIsLeft) {
+TEST_F(CommandLine, ABakeThatWasStoppedGoesOn) {
   const std::string loom = path("long.loom");
-  const pid_t child = start({"bake", scene_, "-o", loom, "--texels-per-metre", "16", "--rays", "16384", "--threads",
-                             "1", "--cell-receivers", "16"});
-  siginfo_t ended{};
-  while (!fs::exists(fs::path(loom) / "chunks") && ended.si_pid == 0) {
-    ASSERT_EQ(::waitid(P_PID, static_cast<id_t>(child), &ended, WEXITED | WNOHANG | WNOWAIT), 0);
-    std::this_thread::yield();
-  }
-  ASSERT_EQ(::kill(child, SIGINT), 0);
-  const Result r = finish(child);
+  const auto bake_to = [&](const std::string& out) -> std::vector<std::string> {
+    return {"bake",           scene_, "-o",        out, "--texels-per-metre", "4",  "--rays",    "1024",
+            "--relight-rays", "64",   "--threads", "1", "--cell-receivers",   "32", "--spacing", "2"};
+  };
+  // Whether the bake has kept `tasks` results; its state has a folder per first byte of each.
+  const auto kept = [&](size_t folders) {
+    std::error_code error;
+    const auto blobs = fs::directory_iterator(loom + ".partial/blobs", error);
+    return !error && static_cast<size_t>(std::distance(fs::begin(blobs), fs::end(blobs))) > folders;
+  };
+  const auto stop_at = [&](size_t folders, int signal) {
+    const pid_t child = start(bake_to(loom));
+    siginfo_t ended{};
+    while (!kept(folders) && ended.si_pid == 0) {
+      EXPECT_EQ(::waitid(P_PID, static_cast<id_t>(child), &ended, WEXITED | WNOHANG | WNOWAIT), 0);
+      std::this_thread::yield();
+    }
+    EXPECT_EQ(::kill(child, signal), 0);
+    return finish(child);
+  };
+  const Result r = stop_at(10, SIGINT);
   EXPECT_EQ(r.code, 130) << r.err;
-  EXPECT_THAT(r.err, HasSubstr("holds no asset yet"));
+  EXPECT_THAT(r.err, HasSubstr("holds no asset yet, and "));
+  EXPECT_THAT(r.err, HasSubstr("bake again to go on"));
   EXPECT_EQ(std::count(r.err.begin(), r.err.end(), '\n'), 1) << r.err;
   EXPECT_FALSE(fs::exists(fs::path(loom) / "manifest"));
+  EXPECT_EQ(stop_at(30, SIGKILL).code, -SIGKILL);
+
+  EXPECT_EQ(run(bake_to(loom)).code, 0);
+  EXPECT_FALSE(fs::exists(loom + ".partial"));
+  ASSERT_EQ(run(bake_to(path("whole.loom"))).code, 0);
+  EXPECT_EQ(text_of(fs::path(loom) / "manifest"), text_of(path("whole.loom/manifest")));
+  EXPECT_EQ(run({"verify", loom}).code, 0);
 }
 
 TEST_F(CommandLine, WhatIsWrongWithALevelIsOneWarning) {
