@@ -4,11 +4,11 @@
 
 namespace lightloom {
 
-absl::StatusOr<std::unique_ptr<Farm>> Farm::open(const std::filesystem::path& folder,
-                                                 const CoordinatorOptions& options) {
+absl::StatusOr<std::unique_ptr<Farm>> Farm::open(const std::filesystem::path& folder, const CoordinatorOptions& options,
+                                                 Durability durability) {
   auto farm = std::make_unique<Farm>();
-  LL_ASSIGN_OR_RETURN(farm->store_, open_sqlite_store(folder));
-  LL_ASSIGN_OR_RETURN(farm->blobs_, BlobStore::open(folder / "blobs"));
+  LL_ASSIGN_OR_RETURN(farm->store_, open_sqlite_store(folder, durability));
+  LL_ASSIGN_OR_RETURN(farm->blobs_, BlobStore::open(folder / "blobs", durability));
   farm->coordinator_ =
       std::make_unique<Coordinator>(farm->store_.get(), farm->blobs_.get(), steady_unix_clock(), options);
   return farm;

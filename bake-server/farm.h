@@ -10,10 +10,11 @@ namespace lightloom {
 
 class Farm {
  public:
-  /// FOLDER/farm.db, FOLDER/blobs, FOLDER/lock. Errors: another server has the folder, it cannot be used, its database is
+  /// FOLDER/store.db, FOLDER/blobs, FOLDER/lock. Errors: another server has the folder, it cannot be used, its database is
   /// damaged or of a newer release.
   static absl::StatusOr<std::unique_ptr<Farm>> open(const std::filesystem::path& folder,
-                                                    const CoordinatorOptions& options = {});
+                                                    const CoordinatorOptions& options = {},
+                                                    Durability durability = Durability::kPowerLoss);
 
   Coordinator& coordinator() { return *coordinator_; }
   BlobStore& blobs() { return *blobs_; }

@@ -1,6 +1,7 @@
 #include "cli/local_bake.h"
 
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <thread>
 #include <utility>
@@ -32,6 +33,13 @@ class LocalWorker {
   Worker worker_;
   std::thread thread_;
 };
+
+/// Names the time since the machine started: what was not waited for until it was on the disk is good for that long.
+std::string this_boot() {
+  std::string id = "boot";
+  std::ifstream("/proc/sys/kernel/random/boot_id") >> id;
+  return id.substr(0, 8);
+}
 
 absl::Status stopped(const std::string& loom, const RemoteJob& job) {
   std::error_code error;
@@ -67,7 +75,7 @@ absl::StatusOr<BakeReport> local_bake(const RayTracer& tracer, const BakeParams&
   const std::string request_id = sha256(payload).hex();
 
   const std::string state = loom + ".partial";
-  LL_ASSIGN_OR_RETURN(auto farm, Farm::open(state));
+  LL_ASSIGN_OR_RETURN(auto farm, Farm::open(fs::path(state) / this_boot(), {}, Durability::kProcess));
   const ServerInfo info{std::string(kVersion), kProtocolVersion, std::string(kMethodVersion)};
   LL_ASSIGN_OR_RETURN(auto server, Server::start_in_process(info, farm.get()));
   FarmClient client(server->in_process_channel(), state);

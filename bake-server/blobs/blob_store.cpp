@@ -8,8 +8,6 @@
 #include <string>
 #include <utility>
 
-#include "core/base/file.h"
-
 namespace lightloom {
 namespace fs = std::filesystem;
 namespace {
@@ -79,14 +77,14 @@ absl::Status write_at(const fs::path& path, uint64_t offset, std::span<const uin
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<BlobStore>> BlobStore::open(const fs::path& folder) {
+absl::StatusOr<std::unique_ptr<BlobStore>> BlobStore::open(const fs::path& folder, Durability durability) {
   std::error_code error;
   fs::create_directories(folder / "uploads", error);
   if (error) {
     return absl::UnavailableError("cannot make " + (folder / "uploads").string() + ": " + error.message() +
                                   "; choose another folder");
   }
-  return std::unique_ptr<BlobStore>(new BlobStore(folder));
+  return std::unique_ptr<BlobStore>(new BlobStore(folder, durability));
 }
 
 fs::path BlobStore::path(const Digest& digest) const {
@@ -157,14 +155,24 @@ absl::Status BlobStore::append(const Digest& digest, uint64_t size, uint64_t off
     fs::remove(part(digest), ignored);
     return absl::DataLossError("blob " + digest.hex() + " arrived with other bytes; send it again");
   }
+  return commit(part(digest), digest);
+}
+
+absl::Status BlobStore::commit(const fs::path& temporary, const Digest& digest) const {
   std::error_code error;
   fs::create_directories(path(digest).parent_path(), error);
-  return commit_file(part(digest), path(digest));
+  if (durability_ == Durability::kPowerLoss) return commit_file(temporary, path(digest));
+  fs::rename(temporary, path(digest), error);
+  if (!error) return absl::OkStatus();
+  return absl::UnavailableError("cannot rename " + temporary.string() + ": " + error.message());
 }
 
 absl::StatusOr<Digest> BlobStore::put(std::span<const uint8_t> bytes) {
   const Digest digest = sha256(bytes);
-  if (!has(digest)) LL_RETURN_IF_ERROR(write_file_atomic(path(digest), bytes));
+  if (has(digest)) return digest;
+  const fs::path temporary = temporary_beside(part(digest));
+  LL_RETURN_IF_ERROR(write_at(temporary, 0, bytes));
+  LL_RETURN_IF_ERROR(commit(temporary, digest));
   return digest;
 }
 

@@ -9,18 +9,20 @@
 #include <span>
 #include <vector>
 
+#include "core/base/file.h"
 #include "core/base/hash.h"
 #include "core/base/status.h"
 
 namespace lightloom {
 
-/// Thread-safe. A blob is there whole and right, or not at all: also after a crash.
+/// Thread-safe. A blob is there whole and right, or not at all: also after whatever `durability` speaks of.
 class BlobStore {
  public:
   static constexpr uint64_t kMostBytes = uint64_t{16} << 30;  ///< of a blob
 
   /// FOLDER/HH/H…H for blobs, FOLDER/uploads for parts. Errors name the folder.
-  static absl::StatusOr<std::unique_ptr<BlobStore>> open(const std::filesystem::path& folder);
+  static absl::StatusOr<std::unique_ptr<BlobStore>> open(const std::filesystem::path& folder,
+                                                         Durability durability = Durability::kPowerLoss);
 
   bool has(const Digest& digest) const;
   /// Bytes of a blob; NotFound.
@@ -37,12 +39,15 @@ class BlobStore {
   absl::StatusOr<Digest> put(std::span<const uint8_t> bytes);
 
  private:
-  explicit BlobStore(std::filesystem::path folder) : folder_(std::move(folder)) {}
+  BlobStore(std::filesystem::path folder, Durability durability)
+      : folder_(std::move(folder)), durability_(durability) {}
+  absl::Status commit(const std::filesystem::path& temporary, const Digest& digest) const;
   std::filesystem::path path(const Digest& digest) const;
   std::filesystem::path part(const Digest& digest) const;
   std::shared_ptr<std::mutex> turn(const Digest& digest);
 
   std::filesystem::path folder_;
+  Durability durability_;
   std::mutex mutex_;
   std::map<Digest, std::weak_ptr<std::mutex>> turns_;  // one upload of a blob at a time
 };

@@ -79,7 +79,7 @@ Database::~Database() {
   LL_CHECK(sqlite3_close(impl_->connection) == SQLITE_OK);
 }
 
-absl::StatusOr<std::unique_ptr<Database>> Database::open(const std::filesystem::path& file) {
+absl::StatusOr<std::unique_ptr<Database>> Database::open(const std::filesystem::path& file, Durability durability) {
   auto impl = std::make_unique<Impl>();
   impl->file = file;
   // NOMUTEX: the owner serialises the calls.
@@ -98,7 +98,9 @@ absl::StatusOr<std::unique_ptr<Database>> Database::open(const std::filesystem::
                                                         mode.bytes(0), "'): choose a state folder on a local disk"));
     }
   }
-  LL_RETURN_IF_ERROR(database->script("PRAGMA synchronous=FULL; PRAGMA foreign_keys=ON"));
+  LL_RETURN_IF_ERROR(database->script("PRAGMA foreign_keys=ON"));
+  LL_RETURN_IF_ERROR(
+      database->script(durability == Durability::kPowerLoss ? "PRAGMA synchronous=FULL" : "PRAGMA synchronous=OFF"));
   return database;
 }
 

@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+#include "core/base/file.h"
 #include "core/base/status.h"
 
 namespace lightloom {
@@ -47,8 +48,8 @@ class Query {
 /// Not thread-safe.
 class Database {
  public:
-  /// Opens or creates `file`: durable with every commit (WAL, synchronous=FULL), foreign keys enforced.
-  static absl::StatusOr<std::unique_ptr<Database>> open(const std::filesystem::path& file);
+  /// Opens or creates `file`: WAL, every commit durable, foreign keys enforced.
+  static absl::StatusOr<std::unique_ptr<Database>> open(const std::filesystem::path& file, Durability durability);
   ~Database();
   Database(const Database&) = delete;
   Database& operator=(const Database&) = delete;

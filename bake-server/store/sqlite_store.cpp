@@ -110,10 +110,10 @@ struct Counts {
 
 class SqliteStore final : public Store {
  public:
-  absl::Status open(const fs::path& folder) {
+  absl::Status open(const fs::path& folder, Durability durability) {
     LL_RETURN_IF_ERROR(lock_.take(folder));
     const fs::path file = folder / "store.db";
-    LL_ASSIGN_OR_RETURN(db_, Database::open(file));
+    LL_ASSIGN_OR_RETURN(db_, Database::open(file, durability));
     return prepare_sqlite_schema(*db_, file);
   }
 
@@ -680,9 +680,9 @@ class SqliteStore final : public Store {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<Store>> open_sqlite_store(const fs::path& folder) {
+absl::StatusOr<std::unique_ptr<Store>> open_sqlite_store(const fs::path& folder, Durability durability) {
   auto store = std::make_unique<SqliteStore>();
-  LL_RETURN_IF_ERROR(store->open(folder));
+  LL_RETURN_IF_ERROR(store->open(folder, durability));
   return store;
 }
 

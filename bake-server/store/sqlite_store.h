@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "bake-server/store/store.h"
+#include "core/base/file.h"
 #include "core/base/status.h"
 
 namespace lightloom {
@@ -12,6 +13,7 @@ namespace lightloom {
 /// Opens FOLDER/store.db, or begins it: the folder and those above it are made. FOLDER/lock is held while the store
 /// lives, so that a second server refuses to start (FailedPrecondition). FailedPrecondition, too, for a newer schema or
 /// somebody else's database, DataLoss for a damaged one.
-absl::StatusOr<std::unique_ptr<Store>> open_sqlite_store(const std::filesystem::path& folder);
+absl::StatusOr<std::unique_ptr<Store>> open_sqlite_store(const std::filesystem::path& folder,
+                                                         Durability durability = Durability::kPowerLoss);
 
 }  // namespace lightloom

@@ -11,6 +11,12 @@
 
 namespace lightloom {
 
+/// What a change that was reported as made outlives.
+enum class Durability {
+  kPowerLoss,  ///< the end of the machine too: changes wait for the disk
+  kProcess,    ///< the end of the process, however it comes
+};
+
 /// Reads a regular file whole; anything else, pipes too, is an error at once. Errors name the path and the system's
 /// reason.
 absl::StatusOr<std::vector<uint8_t>> read_file(const std::filesystem::path& path);

@@ -44,7 +44,9 @@ struct StoreBackend {
 };
 inline std::ostream& operator<<(std::ostream& out, const StoreBackend& backend) { return out << backend.name; }
 
-inline std::vector<StoreBackend> store_backends() { return {{"Sqlite", open_sqlite_store}}; }
+inline std::vector<StoreBackend> store_backends() {
+  return {{"Sqlite", [](const std::filesystem::path& folder) { return open_sqlite_store(folder); }}};
+}
 
 /// The value; an error fails the test and gives an empty one.
 template <class T>
