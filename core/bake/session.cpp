@@ -23,9 +23,9 @@ Digest hash_plan(const Plan& plan, const Scene& scene) {
   }
   for (const Receiver& r : plan.receivers.all) {
     const struct {
-      uint32_t object, key;
+      uint32_t object, key, parts;
       Vec3 position;
-    } receiver{r.object, r.key, r.point.position};
+    } receiver{r.object, r.key, r.parts, r.point.position};
     h.bytes(&receiver, sizeof receiver);
   }
   for (const Probe& p : plan.placement.probes) {
@@ -95,7 +95,7 @@ absl::StatusOr<std::unique_ptr<BakeSession>> BakeSession::create(Scene scene, co
 
 absl::StatusOr<BakedCell> BakeSession::cell(size_t index, const ChunkSink& sink, const CancelFlag* cancel) const {
   if (index >= plan_.cells.size()) return not_planned("cell", index, plan_.cells.size());
-  const CellTask task = make_cell_task(plan_, tracer_, plan_.cells[index]);
+  const CellTask task = make_cell_task(plan_, scene(), plan_.cells[index]);
   LL_ASSIGN_OR_RETURN(const CellResult result, bake_cell(tracer_, cache_.get(), task, cancel));
   {
     const std::lock_guard lock(mutex_);

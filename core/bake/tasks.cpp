@@ -28,8 +28,7 @@ std::map<Id, uint32_t> enumerate(std::vector<Id> ids) {
 
 }  // namespace
 
-CellTask make_cell_task(const Plan& plan, const RayTracer& tracer, const PlannedCell& cell) {
-  const Scene& scene = tracer.scene();
+CellTask make_cell_task(const Plan& plan, const Scene& scene, const PlannedCell& cell) {
   CellTask task;
   task.params = plan.params;
   task.seed = hash_combine(plan.params.seed, static_cast<uint64_t>(static_cast<uint32_t>(cell.level)));
@@ -73,9 +72,8 @@ CellTask make_cell_task(const Plan& plan, const RayTracer& tracer, const Planned
       point.from = {r.point};
     } else {
       const TexelGrid& grid = plan.receivers.grids[r.object];
-      point.from = TexelOpening(tracer, scene.objects[r.object], plan.layout.uv[r.object], grid, grid.texels[r.texel],
-                                r.back, r.seed)
-                       .points();
+      point.from =
+          texel_points(scene.objects[r.object], plan.layout.uv[r.object], grid, grid.texels[r.texel], r.back, r.parts);
     }
     point.seed = hash_combine(r.seed, plan.params.seed);
     for (const auto& n : near[i]) point.near.push_back(probe_slot.at(n.probe));

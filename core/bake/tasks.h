@@ -32,7 +32,7 @@ struct CellResult {
   double transport_seconds = 0, compress_seconds = 0;  ///< thread time; not part of the result's bytes
 };
 
-CellTask make_cell_task(const Plan& plan, const RayTracer& tracer, const PlannedCell& cell);
+CellTask make_cell_task(const Plan& plan, const Scene& scene, const PlannedCell& cell);
 /// `cache` remembers what the plan's probes see, between cells; the result does not depend on what is in it. Null (as
 /// SL17 is published): a ray is traced for every hit and probe. `cancel` may be null; the only error is cancellation.
 absl::StatusOr<CellResult> bake_cell(const RayTracer& tracer, VisibilityCache* cache, const CellTask& task,

@@ -1,40 +1,65 @@
 #include "core/receivers/texel_opening.h"
 
 #include <algorithm>
+#include <array>
+#include <optional>
 
 #include "core/receivers/open_space.h"
 #include "core/receivers/surface_point.h"
 
 namespace lightloom {
+namespace {
 
-TexelOpening::TexelOpening(const RayTracer& tracer, const Object& object, const LightmapUv& uv, const TexelGrid& grid,
-                           const Texel& texel, bool back, uint64_t seed)
-    : tracer_(tracer), object_(object), uv_(uv), grid_(grid), texel_(texel), back_(back) {
-  if (!anything_stands_on_it()) return;
-  const std::vector<ShadingPoint> all = parts();
-  for (size_t i = 0; i < all.size(); ++i) {
-    if (classify(tracer, all[i], hash_combine(seed, i)) != Space::kSolid) open_.push_back(all[i]);
-  }
-  whole_ = open_.empty() || open_.size() == all.size();
+/// The surface at the middle of part i, pushed off, if the surface goes that far.
+std::optional<ShadingPoint> part_middle(const Object& object, const LightmapUv& uv, const TexelGrid& grid,
+                                        const Texel& texel, bool back, int i) {
+  const auto at = [](int n) { return (static_cast<float>(n) + 0.5f) / kTexelParts; };
+  const auto p = surface_at(object, uv, grid, texel, {at(i % kTexelParts), at(i / kTexelParts)});
+  if (!p) return std::nullopt;
+  return shading_point(object, p->triangle, p->b1, p->b2, back);
 }
 
-/// Points at the middles of kSide × kSide parts, where the surface goes that far.
-std::vector<ShadingPoint> TexelOpening::parts() const {
+}  // namespace
+
+std::vector<ShadingPoint> texel_points(const Object& object, const LightmapUv& uv, const TexelGrid& grid,
+                                       const Texel& texel, bool back, uint16_t parts) {
   std::vector<ShadingPoint> out;
-  for (int i = 0; i < kSide * kSide; ++i) {
-    const auto at = [](int n) { return (static_cast<float>(n) + 0.5f) / kSide; };
-    if (const auto p = surface_at(object_, uv_, grid_, texel_, {at(i % kSide), at(i / kSide)})) {
-      out.push_back(lifted(*p));
-    }
+  for (int i = 0; i < kTexelParts * kTexelParts; ++i) {
+    if (parts != 0 && (parts >> i & 1) == 0) continue;
+    if (const auto middle = part_middle(object, uv, grid, texel, back, i)) out.push_back(*middle);
   }
+  if (out.empty()) out.push_back(shading_point(object, texel.triangle, texel.b1, texel.b2, back));
   return out;
 }
 
-std::vector<ShadingPoint> TexelOpening::points() const {
-  if (!whole_) return open_;
-  std::vector<ShadingPoint> all = parts();
-  if (all.empty()) all.push_back(middle());
-  return all;
+TexelOpening::TexelOpening(const RayTracer& tracer, const Object& object, const LightmapUv& uv, const TexelGrid& grid,
+                           const Texel& texel, bool back, uint64_t seed)
+    : tracer_(tracer), object_(object), uv_(uv), texel_(texel), back_(back) {
+  if (!anything_stands_on_it()) return;
+  std::array<std::optional<ShadingPoint>, kTexelParts * kTexelParts> middles;
+  std::array<bool, kTexelParts * kTexelParts> open{};
+  bool solid = false;
+  for (int i = 0; i < kTexelParts * kTexelParts; ++i) {
+    const size_t k = static_cast<size_t>(i);
+    middles[k] = part_middle(object, uv, grid, texel, back, i);
+    if (!middles[k]) continue;
+    // What a straight line joins is the same space: most parts need no more than one ray.
+    const auto joined = [&](int j) {
+      const auto& other = middles[static_cast<size_t>(j)];
+      return other && tracer.visible(middles[k]->position, other->position);
+    };
+    if (i % kTexelParts > 0 && joined(i - 1)) {
+      open[k] = open[k - 1];
+    } else if (i >= kTexelParts && joined(i - kTexelParts)) {
+      open[k] = open[k - kTexelParts];
+    } else {
+      open[k] = classify(tracer, *middles[k], hash_combine(seed, k)) != Space::kSolid;
+    }
+    solid |= !open[k];
+    if (open[k]) open_.push_back(*middles[k]), parts_ = static_cast<uint16_t>(parts_ | 1u << i);
+  }
+  whole_ = !solid || open_.empty();
+  if (whole_) parts_ = 0;
 }
 
 ShadingPoint TexelOpening::middle() const {
@@ -61,8 +86,8 @@ bool TexelOpening::anything_stands_on_it() const {
   const Vec2 point = c[0] + d1 * texel.b1 + d2 * texel.b2;
   const Vec3 corner =
       s.position + across * (static_cast<float>(texel.x) - point.x) + up * (static_cast<float>(texel.y) - point.y);
-  for (int i = 0; i < kSide; ++i) {
-    const float at = (static_cast<float>(i) + 0.5f) / kSide;
+  for (int i = 0; i < kTexelParts; ++i) {
+    const float at = (static_cast<float>(i) + 0.5f) / kTexelParts;
     if (tracer_.occluded(corner + up * at, across, 1) || tracer_.occluded(corner + across * at, up, 1)) return true;
   }
   return false;

@@ -11,6 +11,14 @@
 
 namespace lightloom {
 
+/// A texel is tested in kTexelParts × kTexelParts parts.
+inline constexpr int kTexelParts = 4;
+
+/// The middles of a texel's parts, pushed off the surface, at least one: averages over them stand for the texel. `parts` as
+/// TexelOpening::parts() has them.
+std::vector<ShadingPoint> texel_points(const Object& object, const LightmapUv& uv, const TexelGrid& grid,
+                                       const Texel& texel, bool back, uint16_t parts);
+
 class TexelOpening {
  public:
   /// Of the texel's front or back side. `seed` names the texel. The arguments must outlive it.
@@ -21,27 +29,23 @@ class TexelOpening {
   bool whole() const { return whole_; }
   /// Whether a point of the texel lies in open space.
   bool contains(const SurfacePoint& point) const;
-  /// The middles of its parts that lie in open space, pushed off the surface; at least one. Averages over them stand for
-  /// the texel.
-  std::vector<ShadingPoint> points() const;
-  /// The one of these that lies most in their midst; the texel's own point if it is whole.
+  /// A bit for each of its parts that lie in open space; 0 if it is whole.
+  uint16_t parts() const { return parts_; }
+  /// The middle of the open part that lies most in the midst of them; the texel's own point if it is whole.
   ShadingPoint middle() const;
 
  private:
-  static constexpr int kSide = 4;  ///< the texel is tested in kSide × kSide parts
-
   ShadingPoint lifted(const SurfacePoint& p) const { return shading_point(object_, p.triangle, p.b1, p.b2, back_); }
   bool anything_stands_on_it() const;
-  std::vector<ShadingPoint> parts() const;
 
   const RayTracer& tracer_;
   const Object& object_;
   const LightmapUv& uv_;
-  const TexelGrid& grid_;
   const Texel& texel_;
   bool back_;
   bool whole_ = true;
-  std::vector<ShadingPoint> open_;  ///< parts in open space, if it is not whole
+  uint16_t parts_ = 0;
+  std::vector<ShadingPoint> open_;  ///< middles of the open parts, if it is not whole
 };
 
 }  // namespace lightloom

@@ -86,7 +86,7 @@ int run(int argc, char** argv) {
   const Strata strata = strata_of(static_cast<uint32_t>(plan.params.rays));
   std::atomic<uint64_t> hits{0};
   std::vector<CellTask> tasks(plan.cells.size());
-  parallel_for(tasks.size(), {}, [&](uint64_t i) { tasks[i] = make_cell_task(plan, *tracer, plan.cells[i]); });
+  parallel_for(tasks.size(), {}, [&](uint64_t i) { tasks[i] = make_cell_task(plan, scene, plan.cells[i]); });
   const auto bare_seconds = [&] {
     const Stopwatch watch;
     parallel_for(tasks.size(), {}, [&](uint64_t i) {
@@ -110,7 +110,7 @@ int run(int argc, char** argv) {
   std::vector<GatherStats> stats(tasks.size());
   const Stopwatch watch;
   parallel_for(plan.cells.size(), {}, [&](uint64_t i) {
-    const CellTask task = make_cell_task(plan, *tracer, plan.cells[i]);
+    const CellTask task = make_cell_task(plan, scene, plan.cells[i]);
     Gatherer gatherer(*tracer, cached ? &cache : nullptr, {task.probes, task.probe_ids},
                       {params.order, plan.params.rays, !sl17});
     std::vector<float> row(task.probes.size() * static_cast<size_t>(sh_count(params.order)));
