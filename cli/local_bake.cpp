@@ -75,7 +75,9 @@ absl::StatusOr<BakeReport> local_bake(const RayTracer& tracer, const BakeParams&
   const std::string request_id = sha256(payload).hex();
 
   const std::string state = loom + ".partial";
-  LL_ASSIGN_OR_RETURN(auto farm, Farm::open(fs::path(state) / this_boot(), {}, Durability::kProcess));
+  CoordinatorOptions options;
+  options.keep_leases = false;
+  LL_ASSIGN_OR_RETURN(auto farm, Farm::open(fs::path(state) / this_boot(), options, Durability::kProcess));
   const ServerInfo info{std::string(kVersion), kProtocolVersion, std::string(kMethodVersion)};
   LL_ASSIGN_OR_RETURN(auto server, Server::start_in_process(info, farm.get()));
   FarmClient client(server->in_process_channel(), state);
@@ -86,9 +88,9 @@ absl::StatusOr<BakeReport> local_bake(const RayTracer& tracer, const BakeParams&
   }
   if (!job.ended()) {
     const auto threads = static_cast<uint32_t>(thread_count(control.threads));
-    WorkerOptions options{"this", introduce_this_machine(threads), 1, payload, session};
+    WorkerOptions worker{"this", introduce_this_machine(threads), 1, payload, session};
     LL_ASSIGN_OR_RETURN(
-        job, run_job(std::move(job), &client, server->in_process_channel(), std::move(options), loom, control));
+        job, run_job(std::move(job), &client, server->in_process_channel(), std::move(worker), loom, control));
   }
   const auto forget = [&] {
     server.reset();

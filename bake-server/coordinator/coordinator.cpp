@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <limits>
 #include <random>
 #include <utility>
 
@@ -28,8 +29,12 @@ Coordinator::Clock steady_unix_clock() {
 
 Coordinator::Coordinator(Store* store, BlobStore* blobs, Clock clock, CoordinatorOptions options)
     : store_(store), blobs_(blobs), clock_(std::move(clock)), options_(options) {
-  // Workers could not say that they are alive while nobody listened.
-  (void)store_->renew_all(clock_() + options_.lease_ms);
+  if (options_.keep_leases) {
+    // Workers could not say that they are alive while nobody listened.
+    (void)store_->renew_all(clock_() + options_.lease_ms);
+  } else {
+    (void)store_->expire(std::numeric_limits<int64_t>::max());
+  }
   thread_ = std::thread([this] { loop(); });
 }
 

@@ -79,6 +79,7 @@ struct CoordinatorOptions {
   uint32_t lease_ms = 30'000;
   uint32_t max_failures = 3;  ///< of a task, then it has failed for good
   uint32_t tick_ms = 100;     ///< how often leases and watchers are looked at
+  bool keep_leases = true;    ///< of an earlier process on this state; false: its workers died with it
   DecideOptions decide;
 };
 

@@ -227,8 +227,8 @@ TEST_F(CommandLine, TheDecoderHasNoTimesAndSimdHas) {
 TEST_F(CommandLine, ABakeThatWasStoppedGoesOn) {
   const std::string loom = path("long.loom");
   const auto bake_to = [&](const std::string& out) -> std::vector<std::string> {
-    return {"bake",           scene_, "-o",        out, "--texels-per-metre", "4",  "--rays",    "256",
-            "--relight-rays", "64",   "--threads", "1", "--cell-receivers",   "32", "--spacing", "2"};
+    return {"bake",           scene_, "-o",        out, "--texels-per-metre", "4",   "--rays",    "256",
+            "--relight-rays", "64",   "--threads", "1", "--cell-receivers",   "128", "--spacing", "2"};
   };
   const auto only_folder = [](const fs::path& folder) {
     std::error_code error;
