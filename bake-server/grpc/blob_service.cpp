@@ -14,9 +14,13 @@ constexpr int kMostDigests = 8192;
 /// Takes an upload piece by piece; what arrived before a cut is kept.
 class Writing final : public grpc::ServerReadReactor<v1::WriteRequest> {
  public:
-  Writing(BlobStore* store, v1::WriteResponse* response) : store_(store), response_(response) { StartRead(&piece_); }
+  Writing(BlobStore* store, v1::WriteResponse* response) : store_(store), response_(response) {
+    const auto lock = hand_over_.hold();
+    StartRead(&piece_);
+  }
 
   void OnReadDone(bool ok) override {
+    const auto lock = hand_over_.hold();
     if (!ok) {
       if (!status_) status_ = absl::InvalidArgumentError("an upload must begin with the blob's name");
       response_->set_size(offset_);
@@ -29,7 +33,10 @@ class Writing final : public grpc::ServerReadReactor<v1::WriteRequest> {
     }
     StartRead(&piece_);
   }
-  void OnDone() override { delete this; }
+  void OnDone() override {
+    hand_over_.hold().unlock();
+    delete this;
+  }
 
  private:
   absl::Status take() {
@@ -50,6 +57,7 @@ class Writing final : public grpc::ServerReadReactor<v1::WriteRequest> {
     return absl::OkStatus();
   }
 
+  HandOver hand_over_;
   BlobStore* store_;
   v1::WriteResponse* response_;
   v1::WriteRequest piece_;
@@ -61,6 +69,7 @@ class Writing final : public grpc::ServerReadReactor<v1::WriteRequest> {
 class Reading final : public grpc::ServerWriteReactor<v1::ReadResponse> {
  public:
   Reading(const BlobStore* store, const v1::ReadRequest& request) : store_(store), offset_(request.offset()) {
+    const auto lock = hand_over_.hold();
     const auto digest = to_digest(request.digest());
     if (!digest.ok()) {
       Finish(to_grpc(digest.status()));
@@ -71,13 +80,17 @@ class Reading final : public grpc::ServerWriteReactor<v1::ReadResponse> {
   }
 
   void OnWriteDone(bool ok) override {
+    const auto lock = hand_over_.hold();
     if (ok) {
       next();
     } else {
       Finish(grpc::Status::CANCELLED);
     }
   }
-  void OnDone() override { delete this; }
+  void OnDone() override {
+    hand_over_.hold().unlock();
+    delete this;
+  }
 
  private:
   void next() {
@@ -91,6 +104,7 @@ class Reading final : public grpc::ServerWriteReactor<v1::ReadResponse> {
     StartWrite(&piece_);
   }
 
+  HandOver hand_over_;
   const BlobStore* store_;
   Digest digest_;
   uint64_t offset_;

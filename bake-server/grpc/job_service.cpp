@@ -90,17 +90,34 @@ absl::StatusOr<NewJob> to_job(const v1::SubmitRequest& request, const ServerInfo
 /// Sends a job's states one after the other: the newest, if the reader is slow.
 class Watching final : public grpc::ServerWriteReactor<v1::Job> {
  public:
-  static Watching* start(Coordinator* coordinator, const v1::WatchJobRequest& request) {
-    auto* self = new Watching;
-    // The coordinator may call back after the call has ended, so what both touch lives as long as either.
-    coordinator->watch(static_cast<JobId>(request.id()), request.after_revision(),
-                       [shared = self->shared_](const absl::StatusOr<JobStatus>& job) { return shared->changed(job); });
-    return self;
+  Watching(Coordinator* coordinator, const v1::WatchJobRequest& request)
+      : coordinator_(coordinator), job_(static_cast<JobId>(request.id())), after_(request.after_revision()) {
+    const auto lock = hand_over_.hold();
+    shared_->reactor = this;
+    StartSendInitialMetadata();
   }
 
-  void OnWriteDone(bool ok) override { shared_->written(ok); }
-  void OnCancel() override { shared_->end(grpc::Status::CANCELLED); }
-  void OnDone() override { delete this; }
+  /// From now on gRPC takes what is written at once, in the thread that writes it.
+  void OnSendInitialMetadataDone(bool ok) override {
+    hand_over_.hold().unlock();
+    if (!ok) return shared_->end(grpc::Status::CANCELLED);
+    // The coordinator may call back after the call has ended, so what both touch lives as long as either.
+    coordinator_->watch(job_, after_,
+                        [shared = shared_](const absl::StatusOr<JobStatus>& job) { return shared->changed(job); });
+  }
+  void OnWriteDone(bool ok) override {
+    const auto lock = hand_over_.hold();
+    shared_->written(ok);
+  }
+  void OnCancel() override {
+    const auto lock = hand_over_.hold();
+    shared_->end(grpc::Status::CANCELLED);
+  }
+  void OnDone() override {
+    hand_over_.hold().unlock();
+    shared_->done();
+    delete this;
+  }
 
  private:
   struct Shared {
@@ -134,6 +151,7 @@ class Watching final : public grpc::ServerWriteReactor<v1::Job> {
       }
       go_on();
     }
+    void done() { const std::lock_guard lock(mutex); }  // what ended the call is over, too
     void end(const grpc::Status& status) {
       const std::lock_guard lock(mutex);
       ending = true;
@@ -155,7 +173,10 @@ class Watching final : public grpc::ServerWriteReactor<v1::Job> {
     }
   };
 
-  Watching() { shared_->reactor = this; }
+  HandOver hand_over_;
+  Coordinator* const coordinator_;
+  const JobId job_;
+  const uint64_t after_;
   const std::shared_ptr<Shared> shared_ = std::make_shared<Shared>();
 };
 
@@ -194,7 +215,7 @@ class JobService final : public v1::JobService::CallbackService {
 
   grpc::ServerWriteReactor<v1::Job>* WatchJob(grpc::CallbackServerContext*,
                                               const v1::WatchJobRequest* request) override {
-    return Watching::start(coordinator_, *request);
+    return new Watching(coordinator_, *request);
   }
 
   grpc::ServerUnaryReactor* CancelJob(grpc::CallbackServerContext* context, const v1::CancelJobRequest* request,

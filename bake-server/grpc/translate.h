@@ -4,6 +4,7 @@
 #include <grpcpp/grpcpp.h>
 
 #include <algorithm>
+#include <mutex>
 #include <string>
 
 #include "core/base/hash.h"
@@ -23,6 +24,16 @@ inline absl::StatusOr<Digest> to_digest(const std::string& bytes) {
 }
 
 inline std::string to_bytes(const Digest& digest) { return {digest.bytes.begin(), digest.bytes.end()}; }
+
+/// gRPC hands a reactor from thread to thread under locks of its own, which a race detector cannot see. Every method of a
+/// reactor holds this one, so that it can.
+class HandOver {
+ public:
+  [[nodiscard]] std::unique_lock<std::mutex> hold() { return std::unique_lock(mutex_); }
+
+ private:
+  std::mutex mutex_;
+};
 
 inline grpc::ServerUnaryReactor* finish(grpc::CallbackServerContext* context, const absl::Status& status) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();

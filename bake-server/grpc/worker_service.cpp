@@ -88,6 +88,38 @@ void to_proto(const SyncAnswer& answer, v1::SyncResponse* out) {
   }
 }
 
+/// A Sync that is answered later, from the coordinator's thread.
+class Syncing final : public grpc::ServerUnaryReactor {
+ public:
+  Syncing(Coordinator* coordinator, SyncMessage message, v1::SyncResponse* response)
+      : coordinator_(coordinator), message_(std::move(message)), response_(response) {
+    const auto lock = hand_over_.hold();
+    StartSendInitialMetadata();
+  }
+  /// From now on gRPC takes the answer at once, in the thread that gives it.
+  void OnSendInitialMetadataDone(bool) override {
+    auto lock = hand_over_.hold();
+    SyncMessage message = std::move(message_);
+    lock.unlock();  // the answer may come from within
+    coordinator_->sync(std::move(message), [this](const absl::StatusOr<SyncAnswer>& a) { answer(a); });
+  }
+  void answer(const absl::StatusOr<SyncAnswer>& answer) {
+    const auto lock = hand_over_.hold();
+    if (answer.ok()) to_proto(*answer, response_);
+    Finish(to_grpc(answer.status()));
+  }
+  void OnDone() override {
+    hand_over_.hold().unlock();
+    delete this;
+  }
+
+ private:
+  HandOver hand_over_;
+  Coordinator* const coordinator_;
+  SyncMessage message_;
+  v1::SyncResponse* response_;
+};
+
 class WorkerService final : public v1::WorkerService::CallbackService {
  public:
   WorkerService(ServerInfo info, Coordinator* coordinator) : info_(std::move(info)), coordinator_(coordinator) {}
@@ -114,12 +146,7 @@ class WorkerService final : public v1::WorkerService::CallbackService {
     if (!admission.accepted()) return finish(context, absl::FailedPreconditionError(admission.message));
     auto message = to_message(*request);
     if (!message.ok()) return finish(context, message.status());
-    grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-    coordinator_->sync(*std::move(message), [reactor, response](const absl::StatusOr<SyncAnswer>& answer) {
-      if (answer.ok()) to_proto(*answer, response);
-      reactor->Finish(to_grpc(answer.status()));
-    });
-    return reactor;
+    return new Syncing(coordinator_, *std::move(message), response);
   }
 
  private:
