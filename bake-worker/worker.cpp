@@ -7,14 +7,13 @@
 #include <random>
 
 #include "proto/client.h"
+#include "proto/digest.h"
 #include "proto/worker_service.grpc.pb.h"
 
 namespace lightloom {
 namespace {
 
 constexpr std::chrono::milliseconds kProgressEvery{1000}, kIdleWait{10'000}, kCallDeadline{20'000}, kRetry{500};
-
-std::string bytes_of(const Digest& digest) { return {digest.bytes.begin(), digest.bytes.end()}; }
 
 class RemoteBlobs final : public BlobAccess {
  public:
@@ -169,7 +168,7 @@ absl::Status Worker::sync_once(bool* idle) {
       auto* f = request.add_finished();
       f->set_attempt(attempt);
       f->set_rays(output->rays);
-      for (const Digest& d : output->outputs) f->add_outputs(bytes_of(d));
+      for (const Digest& d : output->outputs) f->add_outputs(to_bytes(d));
       for (const SpawnedTask& s : output->spawned) {
         auto* t = f->add_tasks();
         t->set_kind(s.kind);
@@ -214,9 +213,7 @@ absl::Status Worker::sync_once(bool* idle) {
     running->task.kind = a.kind();
     running->task.payload.assign(a.payload().begin(), a.payload().end());
     running->task.argument.assign(a.argument().begin(), a.argument().end());
-    if (a.inputs().size() == running->task.inputs.bytes.size()) {
-      std::copy(a.inputs().begin(), a.inputs().end(), running->task.inputs.bytes.begin());
-    }
+    if (const auto inputs = to_digest(a.inputs()); inputs.ok()) running->task.inputs = *inputs;
     running_.emplace(a.attempt(), std::move(running));
     queue_.push_back(a.attempt());
   }

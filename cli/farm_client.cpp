@@ -13,12 +13,11 @@
 #include "core/base/text.h"
 #include "core/base/version.h"
 #include "proto/client.h"
+#include "proto/digest.h"
 #include "proto/job_service.grpc.pb.h"
 
 namespace lightloom {
 namespace {
-
-std::string bytes_of(const Digest& digest) { return {digest.bytes.begin(), digest.bytes.end()}; }
 
 std::string state_of(v1::Job::State state) {
   switch (state) {
@@ -56,9 +55,7 @@ RemoteJob to_job(const v1::Job& in) {
   out.revision = in.revision();
   out.error = printable(in.error(), 1000);
   for (const std::string& bytes : in.outputs()) {
-    Digest digest;
-    if (bytes.size() == digest.bytes.size()) std::copy(bytes.begin(), bytes.end(), digest.bytes.begin());
-    out.outputs.push_back(digest);
+    out.outputs.push_back(to_digest(bytes).value_or(Digest{}));
   }
   return out;
 }
@@ -130,7 +127,7 @@ absl::StatusOr<RemoteJob> FarmClient::submit(const std::string& request_id, std:
   request.set_priority(priority);
   request.set_method_version(std::string(kMethodVersion));
   request.set_payload(payload.data(), payload.size());
-  for (const Digest& input : inputs) request.add_inputs(bytes_of(input));
+  for (const Digest& input : inputs) request.add_inputs(to_bytes(input));
   const SpawnedTask first = first_task();
   auto* task = request.add_tasks();
   task->set_kind(first.kind);
@@ -167,15 +164,6 @@ absl::StatusOr<RemoteJob> FarmClient::cancel(uint64_t id) {
   request.set_id(id);
   v1::Job job;
   LL_RETURN_IF_ERROR(in_words(connection_->call(&v1::JobService::Stub::CancelJob, request, &job)));
-  return to_job(job);
-}
-
-absl::StatusOr<RemoteJob> FarmClient::set_priority(uint64_t id, int32_t priority) {
-  v1::SetPriorityRequest request;
-  request.set_id(id);
-  request.set_priority(priority);
-  v1::Job job;
-  LL_RETURN_IF_ERROR(in_words(connection_->call(&v1::JobService::Stub::SetPriority, request, &job)));
   return to_job(job);
 }
 

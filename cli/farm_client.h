@@ -64,7 +64,6 @@ class FarmClient {
   absl::StatusOr<RemoteJob> job(uint64_t id);
   absl::StatusOr<std::vector<RemoteJob>> jobs();
   absl::StatusOr<RemoteJob> cancel(uint64_t id);
-  absl::StatusOr<RemoteJob> set_priority(uint64_t id, int32_t priority);
   absl::StatusOr<std::vector<RemoteWorker>> workers();
   absl::StatusOr<std::vector<RemoteEvent>> events(uint64_t job);
   /// Calls back with each state until the job ends, and returns the last one. Goes on over a server that restarts.

@@ -8,22 +8,12 @@
 
 #include "core/base/text.h"
 #include "proto/blob_service.grpc.pb.h"
+#include "proto/digest.h"
 
 namespace lightloom {
 namespace {
 
 constexpr size_t kPiece = size_t{1} << 20;
-constexpr size_t kMostDigests = 8192;
-
-std::string bytes_of(const Digest& digest) { return {digest.bytes.begin(), digest.bytes.end()}; }
-
-absl::StatusOr<Digest> digest_of(const std::string& bytes) {
-  Digest out;
-  if (bytes.size() != out.bytes.size()) return absl::InternalError("the server sent a digest that is none");
-  std::copy(bytes.begin(), bytes.end(), out.bytes.begin());
-  return out;
-}
-
 /// Another try may find the server there, or the upload where it is.
 bool is_worth_another_try(const grpc::Status& status) {
   switch (status.error_code()) {
@@ -78,31 +68,13 @@ absl::Status call_with_retries(const Patience& patience,
   }
 }
 
-absl::StatusOr<std::vector<Digest>> BlobClient::find_missing(std::span<const Digest> digests) const {
-  const auto stub = v1::BlobService::NewStub(channel_);
-  std::vector<Digest> missing;
-  for (size_t first = 0; first < digests.size(); first += kMostDigests) {
-    v1::FindMissingRequest request;
-    for (const Digest& d : digests.subspan(first, std::min(kMostDigests, digests.size() - first))) {
-      request.add_digests(bytes_of(d));
-    }
-    v1::FindMissingResponse response;
-    LL_RETURN_IF_ERROR(call_with_retries(
-        patience_, [&](grpc::ClientContext* context) { return stub->FindMissing(context, request, &response); }));
-    for (const std::string& d : response.digests()) {
-      LL_ASSIGN_OR_RETURN(missing.emplace_back(), digest_of(d));
-    }
-  }
-  return missing;
-}
-
 absl::StatusOr<Digest> BlobClient::upload(std::span<const uint8_t> bytes,
                                           const std::function<void(uint64_t)>& progress) const {
   const auto stub = v1::BlobService::NewStub(channel_);
   const Digest digest = sha256(bytes);
   LL_RETURN_IF_ERROR(call_with_retries(patience_, [&](grpc::ClientContext* context) {
     v1::GetUploadRequest question;
-    question.set_digest(bytes_of(digest));
+    question.set_digest(to_bytes(digest));
     v1::GetUploadResponse there;
     if (const grpc::Status status = stub->GetUpload(context, question, &there); !status.ok()) return status;
     if (there.complete()) return grpc::Status::OK;
@@ -113,7 +85,7 @@ absl::StatusOr<Digest> BlobClient::upload(std::span<const uint8_t> bytes,
     const auto writer = stub->Write(&stream, &response);
     size_t at = std::min<size_t>(there.offset(), bytes.size());
     v1::WriteRequest piece;
-    piece.set_digest(bytes_of(digest));
+    piece.set_digest(to_bytes(digest));
     piece.set_size(bytes.size());
     piece.set_offset(at);
     do {
@@ -135,7 +107,7 @@ absl::StatusOr<std::vector<uint8_t>> BlobClient::download(const Digest& digest) 
   std::vector<uint8_t> bytes;
   LL_RETURN_IF_ERROR(call_with_retries(patience_, [&](grpc::ClientContext* context) {
     v1::ReadRequest request;
-    request.set_digest(bytes_of(digest));
+    request.set_digest(to_bytes(digest));
     request.set_offset(bytes.size());  // a cut download goes on
     const auto reader = stub->Read(context, request);
     v1::ReadResponse piece;

@@ -43,7 +43,6 @@ class BlobClient {
   explicit BlobClient(std::shared_ptr<grpc::Channel> channel, Patience patience = {})
       : channel_(std::move(channel)), patience_(std::move(patience)) {}
 
-  absl::StatusOr<std::vector<Digest>> find_missing(std::span<const Digest> digests) const;
   /// Sends the blob if the server lacks it; an upload that was cut goes on. `progress`: bytes that are there.
   absl::StatusOr<Digest> upload(std::span<const uint8_t> bytes,
                                 const std::function<void(uint64_t)>& progress = nullptr) const;

@@ -70,7 +70,7 @@ void Coordinator::loop() {
       for (Pending& p : pending_) p.done(status);
       pending_.clear();
     }
-    answer_due(/*all=*/false);
+    answer_due();
     measure_rays();
     tell_watchers();
     std::erase_if(workers_, [&](const auto& w) { return clock_() - w.second.heard_ms > kForgetWorkerMs; });
@@ -235,9 +235,9 @@ absl::StatusOr<std::optional<Digest>> Coordinator::inputs_of(const Task& task) {
   return digest;
 }
 
-void Coordinator::answer_due(bool all) {
+void Coordinator::answer_due() {
   for (Pending& p : pending_) {
-    if (!all && !p.urgent && clock_() < p.until_ms) continue;
+    if (!p.urgent && clock_() < p.until_ms) continue;
     Worker& worker = workers_[p.worker];
     p.answer.sequence = worker.session.answer();
     for (const Assignment& a : p.answer.assignments) worker.session.assigned(a.attempt, p.answer.sequence);

@@ -152,7 +152,7 @@ class Coordinator {
   absl::Status give_out();
   absl::StatusOr<Assignment> assignment(TaskId task, const std::string& attempt);
   absl::StatusOr<std::optional<Digest>> inputs_of(const Task& task);
-  void answer_due(bool all);
+  void answer_due();
   void measure_rays();
   void tell_watchers();
   JobStatus status_of(Job job);
