@@ -61,7 +61,7 @@ std::vector<double> row_by_the_book(const GatherLevel& level, const GatherPoint&
     }
     std::vector<double> weight(level.probes.size(), 0);
     double sum = 0;
-    const auto sees = [&](uint32_t i) {
+    const auto sees = [&, omega = omega](uint32_t i) {  // clang 14 captures no structured binding by itself
       return hit ? level.tracer->visible(y.position, level.probes[i])
                  : !level.tracer->occluded(level.probes[i], omega, kInfinity);
     };
