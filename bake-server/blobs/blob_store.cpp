@@ -1,6 +1,7 @@
 #include "bake-server/blobs/blob_store.h"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -75,24 +76,37 @@ absl::Status write_at(const fs::path& path, uint64_t offset, std::span<const uin
   return absl::OkStatus();
 }
 
+/// Makes the file as young as one that was just written. True: it lies there now, and collect_garbage() knows it.
+bool touch(const fs::path& path) {
+  const timespec times[2] = {{0, UTIME_OMIT}, {0, UTIME_NOW}};
+  if (::utimensat(AT_FDCWD, path.c_str(), times, AT_SYMLINK_NOFOLLOW) != 0) return false;
+  // The file may have been moved between the look-up of its name and the change of its time.
+  struct stat info {};
+  return ::lstat(path.c_str(), &info) == 0 && S_ISREG(info.st_mode);
+}
+
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<BlobStore>> BlobStore::open(const fs::path& folder, Durability durability) {
-  std::error_code error;
-  fs::create_directories(folder / "uploads", error);
-  if (error) {
-    return absl::UnavailableError("cannot make " + (folder / "uploads").string() + ": " + error.message() +
-                                  "; choose another folder");
+bool restore_blob(const BlobLayout& layout, const Digest& digest) {
+  const fs::path from = layout.discarded(digest), to = layout.blob(digest);
+  // Unlike a rename, a link leaves a younger file in peace.
+  const bool linked = ::link(from.c_str(), to.c_str()) == 0 || errno == EEXIST;
+  if (linked) return ::unlink(from.c_str()), true;
+  return errno != ENOENT && ::rename(from.c_str(), to.c_str()) == 0;  // a file system without links
+}
+
+absl::StatusOr<std::unique_ptr<BlobStore>> BlobStore::open(const fs::path& folder, Durability durability,
+                                                           CheckRoom check_room) {
+  std::unique_ptr<BlobStore> store(new BlobStore(folder, durability, std::move(check_room)));
+  for (const fs::path& sub : {store->layout_.uploads(), store->layout_.trash()}) {
+    std::error_code error;
+    fs::create_directories(sub, error);
+    if (error) {
+      return absl::UnavailableError("cannot make " + sub.string() + ": " + error.message() + "; choose another folder");
+    }
   }
-  return std::unique_ptr<BlobStore>(new BlobStore(folder, durability));
+  return store;
 }
-
-fs::path BlobStore::path(const Digest& digest) const {
-  const std::string hex = digest.hex();
-  return folder_ / hex.substr(0, 2) / hex.substr(2);
-}
-
-fs::path BlobStore::part(const Digest& digest) const { return folder_ / "uploads" / digest.hex(); }
 
 std::shared_ptr<std::mutex> BlobStore::turn(const Digest& digest) {
   const std::lock_guard lock(mutex_);
@@ -104,30 +118,31 @@ std::shared_ptr<std::mutex> BlobStore::turn(const Digest& digest) {
 }
 
 bool BlobStore::has(const Digest& digest) const {
-  std::error_code error;
-  return fs::is_regular_file(path(digest), error);
+  const fs::path path = layout_.blob(digest);
+  return touch(path) || (restore_blob(layout_, digest) && touch(path));
 }
 
 absl::StatusOr<uint64_t> BlobStore::size(const Digest& digest) const {
   std::error_code error;
-  const uint64_t size = fs::file_size(path(digest), error);
+  uint64_t size = fs::file_size(layout_.blob(digest), error);
+  if (error && restore_blob(layout_, digest)) size = fs::file_size(layout_.blob(digest), error);
   if (error) return absl::NotFoundError("there is no blob " + digest.hex());
   return size;
 }
 
 absl::StatusOr<std::vector<uint8_t>> BlobStore::read(const Digest& digest, uint64_t offset, uint64_t most) const {
-  const File file(path(digest), O_RDONLY);
-  if (!file.is_open()) {
-    if (errno == ENOENT) return absl::NotFoundError("there is no blob " + digest.hex());
-    return failed(path(digest), "open");
-  }
-  return read_at(file, path(digest), offset, most);
+  const fs::path path = layout_.blob(digest);
+  const File file(path, O_RDONLY);
+  if (file.is_open()) return read_at(file, path, offset, most);
+  if (errno != ENOENT) return failed(path, "open");
+  if (restore_blob(layout_, digest)) return read(digest, offset, most);
+  return absl::NotFoundError("there is no blob " + digest.hex());
 }
 
 uint64_t BlobStore::uploaded(const Digest& digest) const {
-  if (const auto whole = size(digest); whole.ok()) return *whole;
+  if (has(digest)) return size(digest).value_or(0);
   std::error_code error;
-  const uint64_t size = fs::file_size(part(digest), error);
+  const uint64_t size = fs::file_size(layout_.part(digest), error);
   return error ? 0 : size;
 }
 
@@ -138,31 +153,36 @@ absl::Status BlobStore::append(const Digest& digest, uint64_t size, uint64_t off
   const auto mine = turn(digest);
   const std::lock_guard lock(*mine);
   if (has(digest)) return absl::OkStatus();
+  if (check_room_) LL_RETURN_IF_ERROR(check_room_());
   if (uploaded(digest) > size) {  // somebody else gave another size
     std::error_code ignored;
-    fs::remove(part(digest), ignored);
+    fs::remove(layout_.part(digest), ignored);
   }
   if (uploaded(digest) != offset) {
     return absl::AbortedError("the upload of blob " + digest.hex() + " is at byte " + std::to_string(uploaded(digest)) +
                               "; go on there");
   }
-  LL_RETURN_IF_ERROR(write_at(part(digest), offset, data));
+  LL_RETURN_IF_ERROR(write_at(layout_.part(digest), offset, data));
   if (offset + data.size() < size) return absl::OkStatus();
 
-  LL_ASSIGN_OR_RETURN(const Digest found, digest_of(part(digest)));
+  LL_ASSIGN_OR_RETURN(const Digest found, digest_of(layout_.part(digest)));
   if (found != digest) {
     std::error_code ignored;
-    fs::remove(part(digest), ignored);
+    fs::remove(layout_.part(digest), ignored);
     return absl::DataLossError("blob " + digest.hex() + " arrived with other bytes; send it again");
   }
-  return commit(part(digest), digest);
+  const absl::Status made = commit(layout_.part(digest), digest);
+  if (!absl::IsNotFound(made)) return made;
+  return absl::AbortedError("blob " + digest.hex() + " was long in coming and is no longer waited for; send it again");
 }
 
 absl::Status BlobStore::commit(const fs::path& temporary, const Digest& digest) const {
+  const fs::path path = layout_.blob(digest);
   std::error_code error;
-  fs::create_directories(path(digest).parent_path(), error);
-  if (durability_ == Durability::kPowerLoss) return commit_file(temporary, path(digest));
-  fs::rename(temporary, path(digest), error);
+  fs::create_directories(path.parent_path(), error);
+  touch(temporary);  // its last byte may have come long ago
+  if (durability_ == Durability::kPowerLoss) return commit_file(temporary, path);
+  fs::rename(temporary, path, error);
   if (!error) return absl::OkStatus();
   return absl::UnavailableError("cannot rename " + temporary.string() + ": " + error.message());
 }
@@ -170,7 +190,7 @@ absl::Status BlobStore::commit(const fs::path& temporary, const Digest& digest) 
 absl::StatusOr<Digest> BlobStore::put(std::span<const uint8_t> bytes) {
   const Digest digest = sha256(bytes);
   if (has(digest)) return digest;
-  const fs::path temporary = temporary_beside(part(digest));
+  const fs::path temporary = temporary_beside(layout_.part(digest));
   LL_RETURN_IF_ERROR(write_at(temporary, 0, bytes));
   LL_RETURN_IF_ERROR(commit(temporary, digest));
   return digest;

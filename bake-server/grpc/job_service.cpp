@@ -45,6 +45,7 @@ void to_proto(const JobStatus& status, v1::Job* out) {
   out->set_tasks_done(job.done);
   out->set_tasks_running(job.running);
   out->set_tasks_failed(job.failed);
+  out->set_tasks_reused(job.reused);
   out->set_rays(status.rays);
   out->set_rays_per_second(status.rays_per_second);
   out->set_workers(status.workers);

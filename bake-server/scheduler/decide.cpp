@@ -14,6 +14,7 @@ class Deciding {
   Deciding(std::vector<JobView> jobs, int64_t now_ms, const DecideOptions& options)
       : jobs_(std::move(jobs)), now_ms_(now_ms), options_(options) {
     for (const JobView& job : jobs_) {
+      priority_[job.id] = job.priority;
       out_of_client_[job.client] += job.live;
       out_of_job_[job.id] += job.live;
       for (const JobView::Running& task : job.running) {
@@ -24,6 +25,7 @@ class Deciding {
 
   std::optional<Decision> next(const Demand& demand) {
     if (auto decision = fresh(demand)) return decision;
+    if (demand.room == 0) return std::nullopt;
     return straggler(demand);
   }
 
@@ -48,13 +50,22 @@ class Deciding {
     for (JobView& job : jobs_) {
       if (!job.ready.empty() && (best == nullptr || rank(job) < rank(*best))) best = &job;
     }
-    if (best == nullptr) return std::nullopt;
+    if (best == nullptr || (demand.room == 0 && !is_urgent(*best, demand))) return std::nullopt;
 
     const auto chosen = choose(*best, demand);
     const JobView::Ready task = *chosen;
     best->ready.erase(chosen);
     best->running.push_back({task.task, task.order, 1, now_ms_, {demand.worker}});
     return give(best, task.task, task.order, demand.worker);
+  }
+
+  bool is_urgent(const JobView& job, const Demand& demand) const {
+    // Jobs that ended meanwhile have no priority, and do not matter.
+    const auto as_urgent = std::count_if(demand.held.begin(), demand.held.end(), [&](JobId held) {
+      const auto known = priority_.find(held);
+      return known != priority_.end() && known->second >= job.priority;
+    });
+    return as_urgent < static_cast<int64_t>(demand.threads);
   }
 
   std::vector<JobView::Ready>::const_iterator choose(const JobView& job, const Demand& demand) {
@@ -92,6 +103,7 @@ class Deciding {
   std::vector<JobView> jobs_;
   int64_t now_ms_;
   DecideOptions options_;
+  std::map<JobId, int32_t> priority_;
   std::map<std::string, uint64_t> out_of_client_;
   std::map<JobId, uint64_t> out_of_job_;
   std::map<JobId, std::set<std::pair<int64_t, std::string>>> runs_;  // per job: runs that workers are in
@@ -107,13 +119,13 @@ std::vector<Decision> decide(std::vector<JobView> jobs, std::vector<Demand> dema
   for (bool gave = true; gave;) {
     gave = false;
     for (Demand& demand : demands) {
-      if (demand.room == 0) continue;
       const auto decision = deciding.next(demand);
       if (!decision) {
-        demand.room = 0;
+        demand.room = demand.threads = 0;
         continue;
       }
-      --demand.room;
+      if (demand.room > 0) --demand.room;
+      demand.held.push_back(decision->job);
       demand.last_job = decision->job;
       demand.last_order = decision->order;
       out.push_back(*decision);

@@ -14,7 +14,9 @@ struct Demand {
   std::string worker;
   uint32_t room = 0;  ///< tasks that it could take
   JobId last_job = 0;
-  int64_t last_order = 0;  ///< of the task that it took last
+  int64_t last_order = 0;        ///< of the task that it took last
+  uint32_t threads = 0;          ///< tasks that it runs at once
+  std::vector<JobId> held = {};  ///< jobs of the tasks that it has, running or queued
 };
 
 struct DecideOptions {
@@ -33,7 +35,9 @@ struct Decision {
 
 /// Gives room away, one task at a time: to the job of highest priority; then the client, then the job with the fewest
 /// tasks out; then the oldest job. Within the job: the worker's own run of orders, then one that nobody is in, then the
-/// first. Stragglers when there is nothing else. At most two leases a task.
+/// first. Stragglers when there is nothing else. At most two leases a task. A worker without room, which has tasks queued
+/// behind those it runs, gets one of higher priority all the same while it has fewer such than threads: it starts it
+/// with the next thread that is free.
 std::vector<Decision> decide(std::vector<JobView> jobs, std::vector<Demand> demands, int64_t now_ms,
                              const DecideOptions& options = {});
 

@@ -111,6 +111,8 @@ absl::Status Database::script(const char* sql) {
 
 int64_t Database::last_insert_id() const { return sqlite3_last_insert_rowid(impl_->connection); }
 
+const std::filesystem::path& Database::file() const { return impl_->file; }
+
 Query Database::prepare(const char* sql) {
   Query query(this);
   PreparedStatement& statement = impl_->statements[sql];
@@ -172,16 +174,25 @@ absl::Status Database::error(int code) const {
 }
 
 absl::Status Transaction::begin() {
+  // SQLite knows whether one is open: some errors end it.
+  const bool inner = sqlite3_get_autocommit(database_.impl_->connection) == 0;
   // IMMEDIATE: what the transaction reads must not change before it writes.
-  return database_.run("BEGIN IMMEDIATE").status();
+  LL_RETURN_IF_ERROR(database_.run(inner ? "SAVEPOINT inner" : "BEGIN IMMEDIATE").status());
+  state_ = inner ? State::kInner : State::kOuter;
+  return absl::OkStatus();
 }
 
-absl::Status Transaction::commit() { return database_.run("COMMIT").status(); }
+absl::Status Transaction::commit() {
+  LL_RETURN_IF_ERROR(database_.run(state_ == State::kInner ? "RELEASE inner" : "COMMIT").status());
+  state_ = State::kClosed;
+  return absl::OkStatus();
+}
 
 Transaction::~Transaction() {
-  // Some errors have undone it already.
   sqlite3* const connection = database_.impl_->connection;
-  if (sqlite3_get_autocommit(connection) == 0) sqlite3_exec(connection, "ROLLBACK", nullptr, nullptr, nullptr);
+  if (state_ == State::kClosed || sqlite3_get_autocommit(connection) != 0) return;
+  sqlite3_exec(connection, state_ == State::kInner ? "ROLLBACK TO inner; RELEASE inner" : "ROLLBACK", nullptr, nullptr,
+               nullptr);
 }
 
 }  // namespace lightloom

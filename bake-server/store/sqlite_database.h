@@ -73,6 +73,7 @@ class Database {
   /// Runs several statements that need no arguments.
   absl::Status script(const char* sql);
   int64_t last_insert_id() const;
+  const std::filesystem::path& file() const;
 
  private:
   friend class Query;
@@ -86,7 +87,7 @@ class Database {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Undone at its end unless committed.
+/// Undone at its end unless committed. One within another is a savepoint: what it commits lasts if the outer one commits.
 class Transaction {
  public:
   explicit Transaction(Database& database) : database_(database) {}
@@ -99,6 +100,7 @@ class Transaction {
 
  private:
   Database& database_;
+  enum class State { kClosed, kOuter, kInner } state_ = State::kClosed;
 };
 
 }  // namespace lightloom

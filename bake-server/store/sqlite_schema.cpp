@@ -7,7 +7,7 @@
 namespace lightloom {
 namespace {
 
-constexpr int64_t kSchemaVersion = 1;
+constexpr int64_t kSchemaVersion = 2;
 
 // A job's row never changes (its payload may be long); what does is its progress.
 // A stage opens by one number, progress.open_stage: tasks hold no "blocked" or "ready" that would have to be rewritten
@@ -22,6 +22,7 @@ CREATE TABLE jobs (
   created_ms INTEGER NOT NULL,
   inputs BLOB NOT NULL,   -- 32 bytes each
   payload BLOB NOT NULL,
+  work BLOB NOT NULL DEFAULT x'',  -- digest of what its tasks' results depend on
   UNIQUE (client, request_id));
 
 CREATE TABLE progress (
@@ -35,6 +36,7 @@ CREATE TABLE progress (
   running INTEGER NOT NULL DEFAULT 0,
   done INTEGER NOT NULL DEFAULT 0,
   failed INTEGER NOT NULL DEFAULT 0,
+  reused INTEGER NOT NULL DEFAULT 0,
   revision INTEGER NOT NULL DEFAULT 1,
   error TEXT NOT NULL DEFAULT '');
 CREATE INDEX progress_running ON progress (job) WHERE state = 0;
@@ -50,11 +52,15 @@ CREATE TABLE tasks (
   kind TEXT NOT NULL,
   error TEXT NOT NULL DEFAULT '',
   outputs BLOB NOT NULL DEFAULT x'', -- 32 bytes each
-  argument BLOB NOT NULL);
+  argument BLOB NOT NULL,
+  key BLOB NOT NULL DEFAULT x'',      -- equal ones have equal outputs; empty: none is known to be equal
+  spawner INTEGER NOT NULL DEFAULT 0); -- the task that asked for it; 0: the job's submitter
 CREATE INDEX tasks_by_order ON tasks (job, stage, ord);
 CREATE INDEX tasks_idle ON tasks (job, stage, ord) WHERE state = 0 AND live = 0;
 CREATE INDEX tasks_live ON tasks (job, ord) WHERE live > 0;
 CREATE INDEX tasks_failed ON tasks (job, ord) WHERE state = 2;
+CREATE INDEX tasks_results ON tasks (key) WHERE state = 1;
+CREATE INDEX tasks_spawned ON tasks (spawner) WHERE spawner != 0;
 
 CREATE TABLE attempts (
   id INTEGER PRIMARY KEY,
@@ -77,9 +83,20 @@ CREATE TABLE events (
   what TEXT NOT NULL);
 CREATE INDEX events_by_job ON events (job);
 
-PRAGMA user_version = 1;
+PRAGMA user_version = 2;
 )";
-static_assert(kSchemaVersion == 1, "the schema's last line says so, too");
+static_assert(kSchemaVersion == 2, "the schema's last line says so, too");
+
+// From version 1, which remembered no keys: what it has is never reused.
+constexpr char kFrom1[] = R"(
+ALTER TABLE jobs ADD COLUMN work BLOB NOT NULL DEFAULT x'';
+ALTER TABLE progress ADD COLUMN reused INTEGER NOT NULL DEFAULT 0;
+ALTER TABLE tasks ADD COLUMN key BLOB NOT NULL DEFAULT x'';
+ALTER TABLE tasks ADD COLUMN spawner INTEGER NOT NULL DEFAULT 0;
+CREATE INDEX tasks_results ON tasks (key) WHERE state = 1;
+CREATE INDEX tasks_spawned ON tasks (spawner) WHERE spawner != 0;
+PRAGMA user_version = 2;
+)";
 
 absl::StatusOr<int64_t> number_of(Database& database, const char* sql) {
   Query query = database.query(sql);
@@ -94,6 +111,10 @@ absl::Status prepare_sqlite_schema(Database& database, const std::filesystem::pa
   LL_RETURN_IF_ERROR(transaction.begin());
   LL_ASSIGN_OR_RETURN(const int64_t version, number_of(database, "PRAGMA user_version"));
   if (version == kSchemaVersion) return absl::OkStatus();
+  if (version == 1) {
+    LL_RETURN_IF_ERROR(database.script(kFrom1));
+    return transaction.commit();
+  }
   if (version != 0) {
     return absl::FailedPreconditionError(
         absl::StrCat(file.string(), " has schema version ", version, ", this server knows up to ", kSchemaVersion,
@@ -106,6 +127,14 @@ absl::Status prepare_sqlite_schema(Database& database, const std::filesystem::pa
   }
   LL_RETURN_IF_ERROR(database.script(kSchema));
   return transaction.commit();
+}
+
+absl::Status check_sqlite_schema(Database& database, const std::filesystem::path& file) {
+  LL_ASSIGN_OR_RETURN(const int64_t version, number_of(database, "PRAGMA user_version"));
+  if (version == kSchemaVersion) return absl::OkStatus();
+  return absl::FailedPreconditionError(absl::StrCat(file.string(), " has schema version ", version,
+                                                    ", this program knows ", kSchemaVersion,
+                                                    ": use the release of the server that works on it"));
 }
 
 }  // namespace lightloom

@@ -23,5 +23,7 @@ enum class AttemptState {
 
 /// Makes the tables in an empty database. FailedPrecondition for a newer schema or somebody else's database.
 absl::Status prepare_sqlite_schema(Database& database, const std::filesystem::path& file);
+/// For who only reads: FailedPrecondition unless the tables are those of this release.
+absl::Status check_sqlite_schema(Database& database, const std::filesystem::path& file);
 
 }  // namespace lightloom

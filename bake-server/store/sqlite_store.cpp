@@ -10,6 +10,7 @@
 #include "bake-server/store/folder_lock.h"
 #include "bake-server/store/sqlite_database.h"
 #include "bake-server/store/sqlite_schema.h"
+#include "bake-server/store/sqlite_upkeep.h"
 #include "core/base/text.h"
 
 namespace lightloom {
@@ -47,6 +48,19 @@ std::string content_of(const NewJob& job) {
     hasher.string(task.kind).value(task.stage).string(task.argument).value(task.order);
   }
   return pack({hasher.finish()});
+}
+
+/// What the results of the job's tasks follow from.
+Digest work_of(const NewJob& job) {
+  Hasher hasher;
+  hasher.string(job.payload).array(job.inputs).value(static_cast<uint64_t>(job.tasks.size()));
+  for (const NewTask& task : job.tasks) hasher.string(task.kind).value(task.stage).string(task.argument);
+  return hasher.finish();
+}
+
+std::string key_of(std::string_view work, const NewTask& task) {
+  if (work.empty()) return {};
+  return pack({Hasher().string(work).string(task.kind).value(task.stage).string(task.argument).finish()});
 }
 
 absl::Status check_arguments(const std::vector<NewTask>& tasks) {
@@ -117,6 +131,14 @@ class SqliteStore final : public Store {
     return prepare_sqlite_schema(*db_, file);
   }
 
+  absl::Status group(const std::function<absl::Status()>& calls) override {
+    const std::lock_guard guard(mutex_);
+    Transaction transaction(*db_);
+    LL_RETURN_IF_ERROR(transaction.begin());
+    LL_RETURN_IF_ERROR(calls());
+    return transaction.commit();
+  }
+
   absl::StatusOr<Job> submit(const NewJob& job, int64_t now_ms) override {
     LL_RETURN_IF_ERROR(check_job(job));
     const std::string content = content_of(job);
@@ -135,13 +157,15 @@ class SqliteStore final : public Store {
       if (there) return read_job(same.integer(0));
     }
 
-    LL_RETURN_IF_ERROR(db_->run("INSERT INTO jobs (client, request_id, content, name, created_ms, inputs, payload)"
-                                " VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)",
-                                job.client, job.request_id, Blob{content}, job.name, now_ms, Blob{pack(job.inputs)},
-                                Blob{job.payload})
-                           .status());
+    const std::string work = pack({work_of(job)});
+    LL_RETURN_IF_ERROR(
+        db_->run("INSERT INTO jobs (client, request_id, content, name, created_ms, inputs, payload, work)"
+                 " VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
+                 job.client, job.request_id, Blob{content}, job.name, now_ms, Blob{pack(job.inputs)}, Blob{job.payload},
+                 Blob{work})
+            .status());
     const JobId id = db_->last_insert_id();
-    LL_RETURN_IF_ERROR(insert_tasks(id, job.tasks));
+    LL_RETURN_IF_ERROR(insert_tasks(id, work, job.tasks, 0));
     uint32_t first_stage = job.tasks[0].stage;
     for (const NewTask& task : job.tasks) first_stage = std::min(first_stage, task.stage);
     const auto ready = std::count_if(job.tasks.begin(), job.tasks.end(),
@@ -151,6 +175,8 @@ class SqliteStore final : public Store {
                                 id, job.priority, first_stage, static_cast<int64_t>(job.tasks.size()), ready)
                            .status());
     LL_RETURN_IF_ERROR(record(id, now_ms, 0, "", "submitted"));
+    LL_RETURN_IF_ERROR(reuse(id, now_ms));
+    LL_RETURN_IF_ERROR(advance(id, now_ms));
     LL_RETURN_IF_ERROR(transaction.commit());
     return read_job(id);
   }
@@ -228,14 +254,16 @@ class SqliteStore final : public Store {
     return kept;
   }
 
-  absl::Status release(const std::string& worker, const std::vector<std::string>& tokens) override {
+  absl::Status release(const std::string& worker, const std::vector<std::string>& tokens, int64_t now_ms) override {
+    if (tokens.empty()) return absl::OkStatus();
     const std::lock_guard guard(mutex_);
     Transaction transaction(*db_);
     LL_RETURN_IF_ERROR(transaction.begin());
     for (const std::string& token : tokens) {
       LL_ASSIGN_OR_RETURN(const Attempt attempt, find_attempt(token));
       if (attempt.state != AttemptState::kLive || attempt.worker != worker) continue;
-      LL_RETURN_IF_ERROR(give_up(attempt, AttemptState::kReleased).status());
+      LL_ASSIGN_OR_RETURN(const JobId job, give_up(attempt, AttemptState::kReleased));
+      LL_RETURN_IF_ERROR(record(job, now_ms, attempt.task, worker, "released"));
     }
     return transaction.commit();
   }
@@ -304,10 +332,9 @@ class SqliteStore final : public Store {
     Counts change{.done = 1};
     (task.state == StoredTask::kFailed ? change.failed : task.live > 0 ? change.running : change.ready) = -1;
     LL_RETURN_IF_ERROR(count(task.job, change));
-    LL_RETURN_IF_ERROR(insert_tasks(task.job, spawned));
-    LL_RETURN_IF_ERROR(db_->run("UPDATE progress SET tasks = tasks + ?2 WHERE job = ?1", task.job,
-                                static_cast<int64_t>(spawned.size()))
-                           .status());
+    LL_ASSIGN_OR_RETURN(const std::string work, work_of_job(task.job));
+    LL_RETURN_IF_ERROR(insert_tasks(task.job, work, spawned, task.id));
+    LL_RETURN_IF_ERROR(add_tasks(task.job, static_cast<int64_t>(spawned.size())));
     LL_RETURN_IF_ERROR(record(task.job, now_ms, task.id, attempt.worker, "completed"));
     LL_RETURN_IF_ERROR(advance(task.job, now_ms));
     LL_RETURN_IF_ERROR(transaction.commit());
@@ -443,6 +470,18 @@ class SqliteStore final : public Store {
     }
   }
 
+  absl::StatusOr<Forgotten> forget_ended(int64_t before_ms, uint32_t limit) override {
+    const std::lock_guard guard(mutex_);
+    return lightloom::forget_ended(*db_, before_ms, limit);
+  }
+
+  // These two read over connections of their own: no lock.
+  absl::Status referenced(const VisitDigest& visit) override { return visit_references(*db_, visit); }
+
+  absl::StatusOr<std::vector<Digest>> references_of(const std::string& client) override {
+    return lightloom::references_of(*db_, client);
+  }
+
  private:
   struct Attempt {
     int64_t id = 0;  // 0: there is none
@@ -491,13 +530,63 @@ class SqliteStore final : public Store {
                    .outputs = query.bytes(5)};
   }
 
-  absl::Status insert_tasks(JobId job, const std::vector<NewTask>& tasks) {
+  absl::StatusOr<std::string> work_of_job(JobId job) {
+    Query query = db_->query("SELECT work FROM jobs WHERE id = ?1", job);
+    LL_RETURN_IF_ERROR(query.step().status());
+    return query.bytes(0);
+  }
+
+  absl::Status insert_tasks(JobId job, std::string_view work, const std::vector<NewTask>& tasks, TaskId spawner) {
     for (const NewTask& task : tasks) {
-      LL_RETURN_IF_ERROR(db_->run("INSERT INTO tasks (job, stage, ord, kind, argument) VALUES (?1, ?2, ?3, ?4, ?5)",
-                                  job, task.stage, task.order, task.kind, Blob{task.argument})
+      const std::string key = key_of(work, task);
+      LL_RETURN_IF_ERROR(db_->run("INSERT INTO tasks (job, stage, ord, kind, argument, key, spawner)"
+                                  " VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)",
+                                  job, task.stage, task.order, task.kind, Blob{task.argument}, Blob{key}, spawner)
                              .status());
     }
     return absl::OkStatus();
+  }
+
+  absl::Status add_tasks(JobId job, int64_t n) {
+    return db_->run("UPDATE progress SET tasks = tasks + ?2 WHERE job = ?1", job, n).status();
+  }
+
+  /// Tasks of the open stage whose results are known get them, and what followed from them.
+  /// REQUIRES: the stage has just opened: all its tasks are ready.
+  absl::Status reuse(JobId job, int64_t now_ms) {
+    std::vector<std::pair<TaskId, TaskId>> known;  // a task, and its twin that is done
+    {
+      // One twin each: they have equal outputs, or else an event said so.
+      Query query = db_->query(
+          "SELECT t.id, (SELECT d.id FROM tasks d INDEXED BY tasks_results WHERE d.key = t.key AND d.state = 1 LIMIT 1)"
+          " AS twin FROM tasks t INDEXED BY tasks_idle JOIN progress p ON p.job = t.job"
+          " WHERE t.job = ?1 AND t.stage = p.open_stage AND t.state = 0 AND t.live = 0 AND t.key != x''"
+          " AND twin NOT NULL",
+          job);
+      for (;;) {
+        LL_ASSIGN_OR_RETURN(const bool row, query.step());
+        if (!row) break;
+        known.emplace_back(query.integer(0), query.integer(1));
+      }
+    }
+    for (const auto& [task, twin] : known) {
+      LL_RETURN_IF_ERROR(db_->run("UPDATE tasks SET state = 1, outputs = (SELECT outputs FROM tasks WHERE id = ?2)"
+                                  " WHERE id = ?1",
+                                  task, twin)
+                             .status());
+      LL_ASSIGN_OR_RETURN(const int64_t spawned,
+                          db_->run("INSERT INTO tasks (job, stage, ord, kind, argument, key, spawner)"
+                                   " SELECT ?1, stage, ord, kind, argument, key, ?2"
+                                   " FROM tasks INDEXED BY tasks_spawned WHERE spawner = ?3 AND spawner != 0"
+                                   " ORDER BY id",
+                                   job, task, twin));
+      if (spawned > 0) LL_RETURN_IF_ERROR(add_tasks(job, spawned));
+      LL_RETURN_IF_ERROR(record(job, now_ms, task, "", "reused"));
+    }
+    const auto n = static_cast<int64_t>(known.size());
+    if (n == 0) return absl::OkStatus();
+    LL_RETURN_IF_ERROR(count(job, {.ready = -n, .done = n}));
+    return db_->run("UPDATE progress SET reused = reused + ?2 WHERE job = ?1", job, n).status();
   }
 
   static absl::Status check_spawned(const TaskRow& task, const std::vector<NewTask>& spawned) {
@@ -548,33 +637,36 @@ class SqliteStore final : public Store {
         .status();
   }
 
-  /// Opens the next stage or ends the job, if the open stage has nothing left to do.
+  /// Opens the next stage or ends the job, as often as the open stage has nothing left to do.
   absl::Status advance(JobId job, int64_t now_ms) {
-    int64_t failed = 0;
-    int64_t blocked = 0;
-    int64_t done = 0;
-    {
-      Query query = db_->query(
-          "SELECT ready + running, failed, tasks - ready - running - done - failed, done FROM progress WHERE job = ?1",
-          job);
-      LL_RETURN_IF_ERROR(query.step().status());
-      if (query.integer(0) > 0) return absl::OkStatus();
-      failed = query.integer(1);
-      blocked = query.integer(2);
-      done = query.integer(3);
-    }
-    if (failed > 0) return end(job, blocked > 0 || done == 0 ? JobState::kFailed : JobState::kPartial, now_ms);
-    if (blocked == 0) return end(job, JobState::kDone, now_ms);
-    LL_RETURN_IF_ERROR(db_->run("UPDATE progress SET open_stage = (SELECT MIN(stage) FROM tasks"
-                                " WHERE job = ?1 AND stage > open_stage) WHERE job = ?1",
-                                job)
-                           .status());
-    return db_
-        ->run(
-            "UPDATE progress SET ready = (SELECT COUNT(*) FROM tasks WHERE job = ?1 AND stage = open_stage)"
+    for (;;) {
+      int64_t failed = 0;
+      int64_t blocked = 0;
+      int64_t done = 0;
+      {
+        Query query = db_->query(
+            "SELECT ready + running, failed, tasks - ready - running - done - failed, done FROM progress"
             " WHERE job = ?1",
-            job)
-        .status();
+            job);
+        LL_RETURN_IF_ERROR(query.step().status());
+        if (query.integer(0) > 0) return absl::OkStatus();
+        failed = query.integer(1);
+        blocked = query.integer(2);
+        done = query.integer(3);
+      }
+      if (failed > 0) return end(job, blocked > 0 || done == 0 ? JobState::kFailed : JobState::kPartial, now_ms);
+      if (blocked == 0) return end(job, JobState::kDone, now_ms);
+      LL_RETURN_IF_ERROR(db_->run("UPDATE progress SET open_stage = (SELECT MIN(stage) FROM tasks"
+                                  " WHERE job = ?1 AND stage > open_stage) WHERE job = ?1",
+                                  job)
+                             .status());
+      LL_RETURN_IF_ERROR(
+          db_->run("UPDATE progress SET ready = (SELECT COUNT(*) FROM tasks WHERE job = ?1 AND stage = open_stage)"
+                   " WHERE job = ?1",
+                   job)
+              .status());
+      LL_RETURN_IF_ERROR(reuse(job, now_ms));
+    }
   }
 
   /// REQUIRES: the job runs and has no live attempts.
@@ -636,7 +728,7 @@ class SqliteStore final : public Store {
       Query query = db_->query(
           "SELECT j.request_id, j.client, j.name, p.priority, j.payload, j.inputs, p.state, j.created_ms, "
           "p.finished_ms,"
-          " p.tasks, p.ready, p.running, p.done, p.failed, p.revision, p.error"
+          " p.tasks, p.ready, p.running, p.done, p.failed, p.reused, p.revision, p.error"
           " FROM jobs j JOIN progress p ON p.job = j.id WHERE j.id = ?1",
           id);
       LL_ASSIGN_OR_RETURN(const bool found, query.step());
@@ -657,8 +749,9 @@ class SqliteStore final : public Store {
              .running = unsigned_at(11),
              .done = unsigned_at(12),
              .failed = unsigned_at(13),
-             .revision = unsigned_at(14),
-             .error = query.bytes(15),
+             .reused = unsigned_at(14),
+             .revision = unsigned_at(15),
+             .error = query.bytes(16),
              .outputs = {}};
     }
     if (job.state == JobState::kRunning) return job;
@@ -673,8 +766,8 @@ class SqliteStore final : public Store {
     }
   }
 
-  FolderLock lock_;  // declared first: let go after the database is closed
-  std::mutex mutex_;
+  FolderLock lock_;               // declared first: let go after the database is closed
+  std::recursive_mutex mutex_;    // a group's calls hold it once more
   std::unique_ptr<Database> db_;  // guarded by mutex_
 };
 

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -53,6 +54,8 @@ struct NewJob {
   std::string payload;   ///< opaque, at most kMaxPayload bytes
   std::vector<Digest> inputs;
   std::vector<NewTask> tasks;  ///< at least one
+
+  // What a task yields must follow from payload, inputs, these tasks, and the task itself: results are used again.
 };
 
 struct Job {
@@ -72,6 +75,7 @@ struct Job {
   uint64_t running = 0;  ///< ready ones with live attempts
   uint64_t done = 0;
   uint64_t failed = 0;          ///< for good
+  uint64_t reused = 0;          ///< of those that are done: taken from an earlier job
   uint64_t revision = 0;        ///< grows with every change of the job
   std::string error;            ///< once it ended kPartial or kFailed: which task failed first (in order), and why
   std::vector<Digest> outputs;  ///< once it ended: those of its last stage's done tasks, in order
@@ -121,8 +125,8 @@ struct Event {
   int64_t at_ms = 0;
   TaskId task = 0;     ///< 0: the job itself
   std::string worker;  ///< empty: no worker's doing
-  /// "submitted", "leased", "completed", "failed: <reason>", "expired", "mismatch", "cancelled", "ended: done",
-  /// "ended: partial", "ended: failed", "ended: cancelled".
+  /// "submitted", "leased", "completed", "reused", "failed: <reason>", "expired", "released", "mismatch", "cancelled",
+  /// "ended: done", "ended: partial", "ended: failed", "ended: cancelled".
   std::string what;
 };
 
@@ -150,6 +154,15 @@ struct JobView {
   std::vector<Running> running;  ///< all tasks with live attempts, in order
 };
 
+/// What forget_ended() did.
+struct Forgotten {
+  uint64_t jobs = 0;  ///< that are gone
+  bool more = false;  ///< the limit came first: call again
+};
+
+/// Returns false to be called no more.
+using VisitDigest = std::function<bool(const Digest&)>;
+
 /// Thread-safe. Reads no clock and makes no random numbers: times are the caller's, in milliseconds, and so are tokens.
 /// A call either returns after its change is durable, or changes nothing and returns an error: ResourceExhausted if the
 /// disk is full (worth another try once it is not), DataLoss if the stored state is damaged, Unavailable or
@@ -161,8 +174,14 @@ class Store {
   Store(const Store&) = delete;
   Store& operator=(const Store&) = delete;
 
+  /// Makes what `calls` does with this store durable together, once: all of it, or, if it or the end fails, nothing.
+  /// Other threads wait meanwhile.
+  virtual absl::Status group(const std::function<absl::Status()>& calls) = 0;
+
   /// The job as it is now. The same request again (client, request_id) returns the job that is there; AlreadyExists if
   /// it asked for something else. InvalidArgument beyond the limits above.
+  /// Tasks of a stage that opens, here or later, that an earlier job of any client has done are done at once, with what
+  /// they spawned: equal are kind, stage and argument, of jobs with equal payload, inputs and tasks.
   virtual absl::StatusOr<Job> submit(const NewJob& job, int64_t now_ms) = 0;
   /// Idempotent; an ended job stays as it ended. All its attempts end. NotFound if there is no such job.
   virtual absl::Status cancel(JobId job, int64_t now_ms) = 0;
@@ -177,8 +196,8 @@ class Store {
   virtual absl::StatusOr<std::vector<std::string>> extend(const std::string& worker,
                                                           const std::vector<std::string>& tokens,
                                                           int64_t expires_ms) = 0;
-  /// Hands the worker's live attempts among `tokens` back: no failure, and no event.
-  virtual absl::Status release(const std::string& worker, const std::vector<std::string>& tokens) = 0;
+  /// Hands the worker's live attempts among `tokens` back: no failure.
+  virtual absl::Status release(const std::string& worker, const std::vector<std::string>& tokens, int64_t now_ms) = 0;
   /// Ends live attempts with expires_ms < now_ms, which counts as no failure, and returns their tokens.
   virtual absl::StatusOr<std::vector<std::string>> expire(int64_t now_ms) = 0;
   /// Gives every live attempt until `expires_ms`: after a restart, whose clock may have begun anew.
@@ -209,6 +228,15 @@ class Store {
   virtual absl::StatusOr<std::vector<TaskOutputs>> outputs(JobId job, uint32_t stage) = 0;
   /// At most `limit` events of the job with ids above `after_id`, by id.
   virtual absl::StatusOr<std::vector<Event>> events(JobId job, int64_t after_id, uint32_t limit) = 0;
+
+  /// Deletes jobs that ended before `before_ms`, oldest first, at most about `limit` rows of them at a time: a job that is
+  /// on its way out has fewer events, tasks and outputs from call to call.
+  virtual absl::StatusOr<Forgotten> forget_ended(int64_t before_ms, uint32_t limit) = 0;
+  /// Visits every digest that a job (inputs) or a task (outputs) names at one moment during the call, some of them often.
+  /// Others go on meanwhile.
+  virtual absl::Status referenced(const VisitDigest& visit) = 0;
+  /// The distinct digests of the client's jobs, sorted.
+  virtual absl::StatusOr<std::vector<Digest>> references_of(const std::string& client) = 0;
 };
 
 }  // namespace lightloom

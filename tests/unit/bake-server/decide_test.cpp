@@ -54,6 +54,17 @@ TEST(Decide, AnUrgentJobComesFirst) {
   EXPECT_EQ(decisions[10].job, 1);
 }
 
+TEST(Decide, AnUrgentTaskOvertakesWhatIsQueued) {
+  // Two threads, four tasks of job 1; two more urgent ones start next, a third one would have to wait for those.
+  const Demand full{.worker = "w", .room = 0, .threads = 2, .held = {1, 1, 1, 1}};
+  EXPECT_THAT(per_job(decide({job(1, 9), job(2, 3, "a", 5)}, {full}, 0)), ElementsAre(std::pair(2, 2)));
+  Demand urgent = full;
+  urgent.held = {1, 1, 2, 2};
+  EXPECT_TRUE(decide({job(1, 9), job(2, 3, "a", 5)}, {urgent}, 0).empty());
+  EXPECT_EQ(decide({job(1, 9), job(2, 3, "a", 5), job(3, 1, "a", 6)}, {urgent}, 0).front().job, 3);
+  EXPECT_TRUE(decide({job(1, 9), job(2, 3, "a", 0)}, {full}, 0).empty()) << "it is not more urgent";
+}
+
 TEST(Decide, ClientsShareEvenlyHoweverManyJobsTheyHave) {
   const auto decisions = decide({job(1, 50, "a"), job(2, 50, "a"), job(3, 50, "a"), job(4, 50, "b")}, {{"w", 12}}, 0);
   const auto n = per_job(decisions);

@@ -88,12 +88,31 @@ TEST_F(SqliteStoreTest, WhatWasReportedSurvivesACrash) {
 
 TEST_F(SqliteStoreTest, ANewerSchemaIsRefused) {
   value(open_sqlite_store(folder_.path())).reset();
-  execute("PRAGMA user_version = 2");
+  execute("PRAGMA user_version = 3");
   const absl::Status status = open_error();
   EXPECT_EQ(status.code(), absl::StatusCode::kFailedPrecondition) << status;
-  EXPECT_THAT(std::string(status.message()), HasSubstr("schema version 2, this server knows up to 1"));
-  execute("PRAGMA user_version = 1");
+  EXPECT_THAT(std::string(status.message()), HasSubstr("schema version 3, this server knows up to 2"));
+  execute("PRAGMA user_version = 2");
   EXPECT_TRUE(open_sqlite_store(folder_.path()).ok());
+}
+
+/// What version 1 had: version 2 without what it added.
+TEST_F(SqliteStoreTest, TheSchemaBeforeIsBroughtUp) {
+  auto store = value(open_sqlite_store(folder_.path()));
+  const JobId old = value(store->submit(new_job("r", {cell(0, 0), cell(1, 1)}), 1)).id;
+  EXPECT_TRUE(value(store->lease({1, "w", "a", 100, 1}, 10)));
+  EXPECT_EQ(value(store->complete("a", {digest(1)}, {}, 20)), Completion::kAccepted);
+  EXPECT_TRUE(value(store->lease({2, "w", "b", 100, 1}, 10)));
+  store.reset();
+  for (const char* sql : {"DROP INDEX tasks_results", "DROP INDEX tasks_spawned", "ALTER TABLE jobs DROP COLUMN work",
+                          "ALTER TABLE progress DROP COLUMN reused", "ALTER TABLE tasks DROP COLUMN key",
+                          "ALTER TABLE tasks DROP COLUMN spawner", "PRAGMA user_version = 1"}) {
+    execute(sql);
+  }
+  store = value(open_sqlite_store(folder_.path()));
+  EXPECT_EQ(value(store->complete("b", {digest(2)}, {}, 30)), Completion::kAccepted);
+  EXPECT_EQ(value(store->job(old)).state, JobState::kDone);
+  EXPECT_EQ(value(store->submit(new_job("s", {cell(0, 0), cell(1, 1)}), 40)).done, 0u) << "of which nothing is known";
 }
 
 TEST_F(SqliteStoreTest, SomebodyElsesDatabaseIsRefused) {

@@ -281,10 +281,12 @@ class StoreModel : public testing::TestWithParam<StoreBackend> {
   void release() {
     const std::string worker = random_worker();
     const std::vector<std::string> tokens = {random_token(), random_token()};
-    value(store_->release(worker, tokens));
+    value(store_->release(worker, tokens, now_));
     for (const std::string& name : tokens) {
       const auto named = attempts_.find(name);
-      if (named != attempts_.end() && named->second.worker == worker) named->second.live = false;
+      if (named == attempts_.end() || named->second.worker != worker || !named->second.live) continue;
+      named->second.live = false;
+      note(named->second.task, worker, "released");
     }
   }
 

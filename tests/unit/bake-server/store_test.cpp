@@ -191,7 +191,7 @@ TEST_P(StoreContract, AttemptsAtATaskAreLimitedAndOnePerWorker) {
   EXPECT_TRUE(lease(id, "w", "b", 2));
   EXPECT_FALSE(lease(id, "x", "c", 2));
   EXPECT_EQ(task(id).live, 2u);
-  value(store_->release("v", {"a"}));
+  value(store_->release("v", {"a"}, /*now_ms=*/15));
   EXPECT_TRUE(lease(id, "v", "c", 2)) << "it has none any more";
 }
 
@@ -262,13 +262,14 @@ TEST_P(StoreContract, ReleasedTasksAreReadyAgain) {
   const JobId id = submit(new_job("r", {cell(0, 0)}));
   const TaskId of = task_of(id, 0);
   lease(of, "w", "a");
-  value(store_->release("v", {"a", "unknown"}));
+  value(store_->release("v", {"a", "unknown"}, /*now_ms=*/15));
   EXPECT_EQ(task(of).live, 1u) << "only its own worker hands it back";
-  value(store_->release("w", {"a"}));
-  value(store_->release("w", {"a"}));
+  value(store_->release("w", {"a"}, /*now_ms=*/15));
+  value(store_->release("w", {"a"}, /*now_ms=*/15));
   EXPECT_EQ(task(of).live, 0u);
   EXPECT_EQ(task(of).failures, 0u);
   EXPECT_THAT(counts(job(id)), ElementsAre(1, 1, 0, 0, 0));
+  EXPECT_THAT(history(id), ElementsAre("submitted", "0 leased", "0 released"));
 }
 
 TEST_P(StoreContract, ARestartRenewsEveryLease) {
@@ -368,7 +369,7 @@ TEST_P(StoreContract, LateResultsAreAccepted) {
   value(store_->expire(101));
   lease(task_of(id, 0), "v", "newer");
   lease(task_of(id, 1), "w", "released");
-  value(store_->release("w", {"released"}));
+  value(store_->release("w", {"released"}, /*now_ms=*/15));
   lease(task_of(id, 2), "w", "failed");
   fail("failed");
   EXPECT_EQ(complete("expired", 1), Completion::kAccepted);
@@ -587,7 +588,7 @@ TEST_P(StoreContract, EveryChangeOfAJobGrowsItsRevision) {
   EXPECT_TRUE(grew()) << "expiry";
   lease(task_of(id, 0), "w", "b");
   grew();
-  value(store_->release("w", {"b"}));
+  value(store_->release("w", {"b"}, /*now_ms=*/15));
   EXPECT_TRUE(grew()) << "release";
   lease(task_of(id, 0), "w", "c");
   grew();
@@ -631,6 +632,79 @@ TEST_P(StoreContract, TheViewShowsWhatMayBeDecided) {
   EXPECT_EQ(views[1].live, 0u);
   EXPECT_THAT(views[1].ready, ElementsAre(JobView::Ready{of(8), 8}));
   EXPECT_THAT(views[1].running, IsEmpty());
+}
+
+// Results that are known.
+
+TEST_P(StoreContract, WhatAnEarlierJobDidIsNotDoneAgain) {
+  const JobId first = submit(new_job("r", {cell(0, 0)}));
+  lease(task_of(first, 0), "w", "plan");
+  complete("plan", 100, {cell(1, 1), cell(1, 2), cell(2, 3)});
+  lease(task_of(first, 1), "w", "one");
+  complete("one", 101);
+  value(store_->cancel(first, 40));
+
+  NewJob again = new_job("s", {cell(0, 0)});
+  again.client = "d";
+  again.name = "the same by another name";
+  again.priority = 3;
+  const JobId second = submit(again, /*now_ms=*/50);
+  EXPECT_THAT(counts(job(second)), ElementsAre(4, 1, 0, 2, 0));
+  EXPECT_EQ(job(second).reused, 2u);
+  EXPECT_EQ(task(task_of(second, 1)).outputs, std::vector{digest(101)});
+  EXPECT_THAT(history(second), ElementsAre("submitted", "0 reused", "1 reused"));
+  lease(task_of(second, 2), "w", "two");
+  complete("two", 102);
+  lease(task_of(second, 3), "w", "three");
+  complete("three", 103);
+  EXPECT_EQ(job(second).state, JobState::kDone);
+
+  const JobId third = submit(new_job("t", {cell(0, 0)}));
+  EXPECT_EQ(job(third).state, JobState::kDone) << "without any worker";
+  EXPECT_EQ(job(third).outputs, std::vector{digest(103)});
+  EXPECT_EQ(job(third).reused, 4u);
+}
+
+TEST_P(StoreContract, OtherWorkIsNotTakenForKnown) {
+  const JobId first = submit(new_job("r", {cell(0, 0)}));
+  lease(task_of(first, 0), "w", "a");
+  complete("a", 1);
+  NewJob payload = new_job("payload", {cell(0, 0)});
+  payload.payload = "other";
+  NewJob inputs = new_job("inputs", {cell(0, 0)});
+  inputs.inputs = {digest(7)};
+  for (const NewJob& other : {payload, inputs, new_job("argument", {cell(0, 1)}), new_job("stage", {cell(1, 0)}),
+                              new_job("more", {cell(0, 0), cell(0, 1)})}) {
+    EXPECT_EQ(job(submit(other)).done, 0u) << other.request_id;
+  }
+}
+
+TEST_P(StoreContract, AFailedTaskIsTriedAgainByTheNextJob) {
+  const JobId first = submit(new_job("r", {cell(0, 0)}));
+  lease(task_of(first, 0), "w", "a");
+  fail("a", "broke", 1);
+  EXPECT_EQ(job(first).state, JobState::kFailed);
+  EXPECT_THAT(counts(job(submit(new_job("s", {cell(0, 0)})))), ElementsAre(1, 1, 0, 0, 0));
+}
+
+TEST_P(StoreContract, AGroupIsOneStep) {
+  const JobId id = submit(new_job("r", {cell(0, 0), cell(0, 1)}));
+  value(store_->group([&] {
+    EXPECT_TRUE(lease(task_of(id, 0), "w", "a"));
+    EXPECT_EQ(complete("a", 1), Completion::kAccepted);
+    EXPECT_FALSE(store_->cancel(77, 1).ok()) << "which changes nothing, nor what came before";
+    return absl::OkStatus();
+  }));
+  EXPECT_THAT(counts(job(id)), ElementsAre(2, 1, 0, 1, 0));
+  EXPECT_EQ(store_->group([&] {
+    EXPECT_TRUE(lease(task_of(id, 1), "w", "b"));
+    EXPECT_EQ(complete("b", 1), Completion::kAccepted);
+    EXPECT_EQ(job(id).state, JobState::kDone);
+    return absl::AbortedError("no");
+  }),
+            absl::AbortedError("no"));
+  EXPECT_THAT(counts(job(id)), ElementsAre(2, 1, 0, 1, 0));
+  EXPECT_TRUE(lease(task_of(id, 1), "w", "b")) << "the token was never used";
 }
 
 TEST_P(StoreContract, EverythingOutlivesTheStore) {
