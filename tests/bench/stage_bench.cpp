@@ -1,0 +1,71 @@
+// The farm's work without the farm: one of N processes that share out the tasks of a bake's stage 1 and do nothing else.
+//   stage_bench LEVEL.glb LIGHTMAP_SIZE RAYS SPACING I N
+// One thread. Prints the seconds of its share, once the level is planned.
+#include <cstdio>
+#include <cstdlib>
+#include <map>
+
+#include "core/bake/task_runner.h"
+#include "core/base/file.h"
+#include "core/base/stopwatch.h"
+
+namespace lightloom {
+namespace {
+
+constexpr int64_t kRun = 16;  // neighbours that one process takes, as DecideOptions::run
+
+template <class T>
+T or_exit(absl::StatusOr<T> value) {
+  if (value.ok()) return *std::move(value);
+  std::fprintf(stderr, "%s\n", std::string(value.status().message()).c_str());
+  std::exit(1);
+}
+
+/// One thread's.
+class MemoryBlobs final : public BlobAccess {
+ public:
+  absl::StatusOr<std::vector<uint8_t>> get(const Digest& digest) override { return blobs_.at(digest); }
+  absl::StatusOr<Digest> put(std::span<const uint8_t> bytes) override {
+    const Digest digest = sha256(bytes);
+    blobs_[digest].assign(bytes.begin(), bytes.end());
+    return digest;
+  }
+
+ private:
+  std::map<Digest, std::vector<uint8_t>> blobs_;
+};
+
+int run(int argc, char** argv) {
+  if (argc != 7) {
+    std::fprintf(stderr, "usage: stage_bench LEVEL.glb LIGHTMAP_SIZE RAYS SPACING I N\n");
+    return 2;
+  }
+  BakeParams params;
+  params.lightmap_size = std::atoi(argv[2]);
+  params.rays = std::atoi(argv[3]);
+  params.spacing = static_cast<float>(std::atof(argv[4]));
+  const int64_t mine = std::atoi(argv[5]), of = std::atoi(argv[6]);
+  MemoryBlobs blobs;
+  const Digest level = or_exit(blobs.put(or_exit(read_file(argv[1]))));
+  const std::vector<uint8_t> payload = encode_payload({level, params});
+  TaskRunner runner(&blobs);
+  BakeControl control;
+  control.threads = 1;
+  const SpawnedTask first = first_task();
+  const TaskOutput plan = or_exit(runner.run({first.kind, payload, first.argument, {}}, control));
+
+  const Stopwatch watch;
+  uint64_t tasks = 0;
+  for (const SpawnedTask& task : plan.spawned) {
+    if (task.stage != 1 || task.order / kRun % of != mine) continue;
+    or_exit(runner.run({task.kind, payload, task.argument, {}}, control));
+    ++tasks;
+  }
+  std::printf("{\"tasks\": %llu, \"seconds\": %.3f}\n", static_cast<unsigned long long>(tasks), watch.seconds());
+  return 0;
+}
+
+}  // namespace
+}  // namespace lightloom
+
+int main(int argc, char** argv) { return lightloom::run(argc, argv); }
