@@ -26,16 +26,17 @@ bool is_loopback(const std::string& host) {
 
 }  // namespace
 
-absl::Status check_listen_address(std::string_view address) {
+absl::Status check_listen_address(std::string_view address, bool insecure) {
   const size_t colon = address.rfind(':');
   if (colon == std::string_view::npos || colon == 0 || !is_port(address.substr(colon + 1))) {
     return absl::InvalidArgumentError(absl::StrCat(
         "'", printable(address), "' is not an address to listen on: give HOST:PORT, as in 127.0.0.1:7000"));
   }
-  if (!is_loopback(std::string(address.substr(0, colon)))) {
+  if (!insecure && !is_loopback(std::string(address.substr(0, colon)))) {
     return absl::InvalidArgumentError(
         absl::StrCat("cannot listen on '", printable(address),
-                     "': connections have no TLS yet, so only this machine may connect: use 127.0.0.1:PORT"));
+                     "': connections have no TLS yet, so only this machine may connect: use 127.0.0.1:PORT, or give "
+                     "--insecure if everyone on that network may read and change all jobs"));
   }
   return absl::OkStatus();
 }

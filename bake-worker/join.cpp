@@ -17,17 +17,14 @@ Introduction introduce_this_machine(uint32_t threads) {
           // What -march=x86-64-v3 lets the compiler use beyond SSE4.2; Embree needs avx2, fma and f16c of it.
           .avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi") &&
                   __builtin_cpu_supports("bmi2"),
-          .threads = threads};
+          .threads = threads,
+          .canary = std::nullopt};
 }
 
 absl::StatusOr<std::string> join(const std::shared_ptr<grpc::Channel>& channel, const Introduction& self,
                                  std::chrono::milliseconds deadline) {
   v1::JoinRequest request;
-  request.set_version(self.version);
-  request.set_protocol_version(self.protocol_version);
-  request.set_method_version(self.method_version);
-  request.set_avx2(self.avx2);
-  request.set_threads(self.threads);
+  to_proto(self, &request);
 
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + deadline);

@@ -1,4 +1,4 @@
-// lightloom-worker: one baker of a farm.
+// lightloom-worker: one baker of a farm. This process speaks with the server; a child of it does the work.
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
@@ -8,10 +8,15 @@
 #include <chrono>
 #include <csignal>
 #include <string>
+#include <string_view>
 #include <thread>
 
+#include "bake-worker/child_executor.h"
 #include "bake-worker/join.h"
+#include "bake-worker/memory_limits.h"
 #include "bake-worker/worker.h"
+#include "core/bake/canary.h"
+#include "core/base/parse_size.h"
 #include "core/base/stop_signal.h"
 #include "core/base/version.h"
 #include "proto/client.h"
@@ -24,50 +29,79 @@ std::string default_name() {
   return std::string(host) + "-" + std::to_string(getpid());
 }
 
+/// For an option that takes a size.
+CLI::Option* add_size(CLI::App* app, const char* name, uint64_t* bytes, const char* help) {
+  const auto parse = [name = std::string(name), bytes](const std::string& text) {
+    const auto size = lightloom::parse_size(text);
+    if (!size.ok()) throw CLI::ValidationError(name, std::string(size.status().message()));
+    *bytes = *size;
+  };
+  return app->add_option_function<std::string>(name, parse, help)->type_name("SIZE");
+}
+
+/// Takes no more tasks at the first signal, hands back what runs at the second.
+void stop_on_signals(lightloom::StopSignal* signals, lightloom::Worker* worker) {
+  std::thread([signals, worker] {
+    signals->wait();
+    spdlog::info("finishing what it has; a second signal hands it back");
+    worker->drain();
+    signals->wait();
+    worker->stop();
+    for (;;) signals->wait();
+  }).detach();
+}
+
+int fail(const std::string& what, const absl::Status& why) {
+  spdlog::error("{}: {}", what, std::string(why.message()));
+  return 1;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (argc == 2 && std::string_view(argv[1]) == "executor") return lightloom::executor_main();
   CLI::App app{
       "Bakes for a farm: joins a server, runs its tasks until SIGINT or SIGTERM, then finishes those that it has; a "
-      "second "
-      "signal hands them back."};
-  std::string server, name = default_name();
-  uint32_t threads = std::max(1u, std::thread::hardware_concurrency()), timeout = 10, levels = 2;
-  app.add_option("--server", server, "HOST:PORT of lightloom-server")->required();
-  app.add_option("--threads", threads, "tasks at once")->check(CLI::Range(1, 1024))->capture_default_str();
+      "second signal hands them back."};
+  std::string name = default_name();
+  uint32_t timeout = 10;
+  lightloom::ExecutorConfig config;
+  config.threads = std::max(1u, std::thread::hardware_concurrency());
+  config.cache_bytes = lightloom::usable_memory() / 4;
+  app.add_option("--server", config.server, "HOST:PORT of lightloom-server")->required();
+  app.add_option("--threads", config.threads, "tasks at once")->check(CLI::Range(1, 1024))->capture_default_str();
   app.add_option("--name", name, "letters, digits, dots and dashes; no two workers may share one");
-  app.add_option("--levels", levels, "levels kept in memory")->check(CLI::Range(1, 64))->capture_default_str();
+  add_size(&app, "--cache", &config.cache_bytes, "memory for levels that are kept warm [a quarter of the memory]");
+  add_size(&app, "--memory", &config.memory_bytes, "address space that tasks may use, like 8G [0: no limit]");
   app.add_option("--timeout", timeout, "seconds to wait for the server at the start")
       ->check(CLI::Range(1, 3600))
       ->capture_default_str();
   app.set_version_flag("--version", std::string(lightloom::kVersion));
-  CLI11_PARSE(app, argc, argv);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
 
   spdlog::set_default_logger(spdlog::stderr_color_mt("lightloom-worker"));
   lightloom::StopSignal signals;
-  const auto channel = lightloom::dial(server);
-  const lightloom::Introduction who = lightloom::introduce_this_machine(threads);
+  const auto channel = lightloom::dial(config.server);
+  lightloom::Introduction who = lightloom::introduce_this_machine(config.threads);
+  if (who.avx2) {  // else the server says it better
+    const auto canary = lightloom::bake_canary(static_cast<int>(config.threads));
+    if (!canary.ok()) return fail("cannot bake here", canary.status());
+    who.canary = *canary;
+  }
   const auto joined = lightloom::join(channel, who, std::chrono::seconds(timeout));
-  if (!joined.ok()) {
-    spdlog::error("cannot join {}: {}", server, std::string(joined.status().message()));
-    return 1;
-  }
-  spdlog::info("{} joined {} (version {}) with {} threads", name, server, *joined, threads);
+  if (!joined.ok()) return fail("cannot join " + config.server, joined.status());
+  spdlog::info("{} joined {} (version {}) with {} threads", name, config.server, *joined, config.threads);
 
-  lightloom::Worker worker(channel, {.name = name, .who = who, .sessions = levels});
-  std::thread([&] {
-    signals.wait();
-    spdlog::info("finishing what it has; a second signal hands it back");
-    worker.drain();
-    signals.wait();
-    worker.stop();
-    for (;;) signals.wait();
-  }).detach();
-  const absl::Status ended = worker.run();
-  if (!ended.ok()) {
-    spdlog::error("{} refuses: {}", server, std::string(ended.message()));
-    return 1;
-  }
-  spdlog::info("left {}", server);
+  lightloom::ChildOptions child{config};
+  child.on_end = [](const std::string& what) { spdlog::warn("{}", what); };
+  lightloom::ChildExecutor executor(child);
+  lightloom::Worker worker(channel, &executor, {name, who});
+  stop_on_signals(&signals, &worker);
+  if (const absl::Status ended = worker.run(); !ended.ok()) return fail("leaving " + config.server, ended);
+  spdlog::info("left {}", config.server);
   return 0;
 }

@@ -6,47 +6,34 @@
 #include <chrono>
 #include <random>
 
+#include "bake-worker/task_messages.h"
 #include "proto/client.h"
-#include "proto/digest.h"
 #include "proto/worker_service.grpc.pb.h"
 
 namespace lightloom {
 namespace {
 
 constexpr std::chrono::milliseconds kProgressEvery{1000}, kIdleWait{10'000}, kCallDeadline{20'000}, kRetry{500};
+/// So long news wait for more, while there is work in hand.
+constexpr std::chrono::milliseconds kTogether{100};
+/// Work that is kept in hand for each thread, seconds; at most as many tasks as are begun at once.
+constexpr double kAheadSeconds = 0.25;
 
-class RemoteBlobs final : public BlobAccess {
- public:
-  explicit RemoteBlobs(std::shared_ptr<grpc::Channel> channel) : client_(std::move(channel), patience()) {}
-  absl::StatusOr<std::vector<uint8_t>> get(const Digest& digest) override { return client_.download(digest); }
-  absl::StatusOr<Digest> put(std::span<const uint8_t> bytes) override { return client_.upload(bytes); }
+/// More than threads: some wait for the network.
+uint32_t begun_at_once(uint32_t threads) { return threads + 1 + threads / 8; }
 
- private:
-  /// A server that restarts should not cost the work of minutes.
-  static Patience patience() {
-    Patience p;
-    p.total = std::chrono::minutes(10);
-    p.call = std::chrono::seconds(60);
-    return p;
-  }
-  BlobClient client_;
-};
+/// The server will not hear of this worker, however often it asks.
+bool is_final(const absl::Status& status) {
+  return absl::IsFailedPrecondition(status) || absl::IsInvalidArgument(status) || absl::IsUnimplemented(status);
+}
 
 }  // namespace
 
-std::unique_ptr<BlobAccess> remote_blobs(std::shared_ptr<grpc::Channel> channel) {
-  return std::make_unique<RemoteBlobs>(std::move(channel));
-}
-
-Worker::Worker(std::shared_ptr<grpc::Channel> channel, WorkerOptions options)
-    : channel_(std::move(channel)),
-      options_(std::move(options)),
-      blobs_(remote_blobs(channel_)),
-      runner_(blobs_.get(), options_.sessions) {
-  if (options_.session != nullptr) runner_.adopt(options_.payload, options_.session);
+Worker::Worker(std::shared_ptr<grpc::Channel> channel, TaskExecutor* executor, WorkerOptions options)
+    : channel_(std::move(channel)), executor_(*executor), options_(std::move(options)) {
   std::random_device random;
   incarnation_ = uint64_t{random()} << 32 | random() | 1;
-  for (uint32_t i = 0; i < options_.who.threads; ++i) threads_.emplace_back([this] { execute(); });
+  for (uint32_t i = 0; i < begun_at_once(options_.who.threads); ++i) threads_.emplace_back([this] { execute(); });
 }
 
 Worker::~Worker() {
@@ -61,21 +48,29 @@ Worker::~Worker() {
 
 void Worker::drain() {
   const std::lock_guard lock(mutex_);
+  drain_locked();
+}
+
+void Worker::drain_locked() {
   draining_ = true;
-  for (const std::string& attempt : queue_) {
+  for (const auto& [place, attempt] : queue_) {
     running_.erase(attempt);
     released_.push_back(attempt);
   }
   queue_.clear();
-  if (waiting_ != nullptr) waiting_->TryCancel();
-  changed_.notify_all();
+  tell();
 }
 
 void Worker::stop() {
-  drain();
   const std::lock_guard lock(mutex_);
+  drain_locked();
   stopping_ = true;
   for (auto& [attempt, running] : running_) running->cancel.cancel();
+}
+
+/// There may be something to say.
+void Worker::tell() {
+  if (has_news() && news_since_ == Clock::time_point()) news_since_ = Clock::now();
   if (waiting_ != nullptr) waiting_->TryCancel();
   changed_.notify_all();
 }
@@ -85,8 +80,9 @@ void Worker::execute() {
   for (;;) {
     changed_.wait(lock, [&] { return ended_ || !queue_.empty(); });
     if (ended_) return;
-    const std::string attempt = queue_.front();
-    queue_.pop_front();
+    const std::string attempt = queue_.begin()->second;
+    queue_.erase(queue_.begin());
+    if (queue_.empty()) changed_.notify_all();  // time for a Sync, if there is news
     const std::shared_ptr<Running> running = running_.at(attempt);
     lock.unlock();
     run_task(attempt, running.get());
@@ -99,54 +95,67 @@ void Worker::run_task(const std::string& attempt, Running* running) {
   control.threads = static_cast<int>(options_.who.threads);
   control.cancel = &running->cancel;
   control.progress = [running](const std::string&, uint64_t, uint64_t, uint64_t rays) { running->rays = rays; };
+  const Clock::time_point begun = Clock::now();
   absl::StatusOr<TaskOutput> output = absl::CancelledError("cancelled");
-  if (!running->cancel.cancelled()) output = runner_.run(running->task, control);
+  if (!running->cancel.cancelled()) output = run_within_memory(&executor_, running->task, control);
+  const double seconds = std::chrono::duration<double>(Clock::now() - begun).count();
+  const absl::Status health = output.ok() ? absl::OkStatus() : executor_.health();
 
   const std::lock_guard lock(mutex_);
+  if (!health.ok() && health_.ok()) {
+    health_ = health;
+    drain_locked();
+  }
   if (running->lost) {
-    // Nobody waits for it.
-  } else if (absl::IsCancelled(output.status())) {
+    hungry_ = true;
+  } else if (absl::IsCancelled(output.status()) || !health.ok()) {
     released_.push_back(attempt);
   } else {
+    if (output.ok()) mean_seconds_ = mean_seconds_ > 0 ? (mean_seconds_ + seconds) / 2 : seconds;
     finished_.emplace(attempt, std::move(output));
   }
   running_.erase(attempt);
-  if (waiting_ != nullptr) waiting_->TryCancel();
-  changed_.notify_all();
+  tell();
 }
 
 absl::Status Worker::run() {
   for (;;) {
-    bool idle = false;
-    const absl::Status status = sync_once(&idle);
-    if (absl::IsFailedPrecondition(status) || absl::IsInvalidArgument(status) || absl::IsUnimplemented(status)) {
-      return status;
-    }
+    const absl::Status status = sync_once();
+    if (is_final(status)) return status;
     std::unique_lock lock(mutex_);
-    const bool empty = running_.empty() && finished_.empty() && released_.empty();
-    if (draining_ && empty) return absl::OkStatus();
-    if (stopping_ && !status.ok()) return absl::OkStatus();  // nobody hears what is handed back: its lease ends
-    const auto news = [&] { return !finished_.empty() || !released_.empty() || (draining_ && empty); };
+    if (draining_ && running_.empty() && !has_news()) return health_;
+    if (stopping_ && !status.ok()) return health_;  // nobody hears what is handed back: its lease ends
+    if (absl::IsAborted(status) || absl::IsCancelled(status)) continue;
     if (status.ok()) {
-      if (!idle) changed_.wait_for(lock, kProgressEvery, news);
-    } else if (!absl::IsAborted(status) && !absl::IsCancelled(status)) {
+      for (auto at = next_sync(); Clock::now() < at; at = next_sync()) changed_.wait_until(lock, at);
+    } else {
       changed_.wait_for(lock, kRetry, [&] { return stopping_; });
     }
   }
 }
 
-/// `idle`: there is room, so the next Sync may wait on the server for work.
-absl::Status Worker::sync_once(bool* idle) {
+Worker::Clock::time_point Worker::next_sync() const {
+  constexpr Clock::time_point kNow{};
+  if (draining_ && running_.empty()) return kNow;
+  if (has_news()) return queue_.empty() ? kNow : std::min(news_since_ + kTogether, synced_ + kProgressEvery);
+  return hungry_ && room() > 0 ? kNow : synced_ + kProgressEvery;
+}
+
+/// Tasks that it would take now.
+uint32_t Worker::room() const {
+  if (draining_) return 0;
+  const uint32_t threads = options_.who.threads, most = begun_at_once(threads);
+  const double ahead = mean_seconds_ > 0 ? threads * kAheadSeconds / mean_seconds_ : 0;
+  const size_t wanted = threads + static_cast<size_t>(std::min<double>(ahead, most));
+  return wanted > running_.size() ? static_cast<uint32_t>(wanted - running_.size()) : 0;
+}
+
+absl::Status Worker::sync_once() {
   v1::SyncRequest request;
   grpc::ClientContext context;
   {
     const std::lock_guard lock(mutex_);
-    auto* who = request.mutable_who();
-    who->set_version(options_.who.version);
-    who->set_protocol_version(options_.who.protocol_version);
-    who->set_method_version(options_.who.method_version);
-    who->set_avx2(options_.who.avx2);
-    who->set_threads(options_.who.threads);
+    to_proto(options_.who, request.mutable_who());
     request.set_worker(options_.name);
     request.set_incarnation(incarnation_);
     request.set_sequence(++sequence_);
@@ -167,25 +176,13 @@ absl::Status Worker::sync_once(bool* idle) {
       }
       auto* f = request.add_finished();
       f->set_attempt(attempt);
-      f->set_rays(output->rays);
-      for (const Digest& d : output->outputs) f->add_outputs(to_bytes(d));
-      for (const SpawnedTask& s : output->spawned) {
-        auto* t = f->add_tasks();
-        t->set_kind(s.kind);
-        t->set_stage(s.stage);
-        t->set_argument(s.argument.data(), s.argument.size());
-        t->set_order(s.order);
-      }
+      lightloom::to_proto(*output, f);
     }
     for (const std::string& attempt : released_) request.add_released(attempt);
-    const size_t busy = running_.size();
-    const uint32_t room =
-        draining_ || busy >= options_.who.threads ? 0 : options_.who.threads - static_cast<uint32_t>(busy);
-    request.set_room(room);
-    const bool news = !finished_.empty() || !released_.empty();
-    *idle = room > 0;
-    if (room > 0 && !news) {
-      request.set_wait_ms(static_cast<uint32_t>((busy == 0 ? kIdleWait : kProgressEvery).count()));
+    request.set_room(room());
+    news_since_ = {};
+    if (request.room() > 0 && !has_news()) {
+      request.set_wait_ms(static_cast<uint32_t>((running_.empty() ? kIdleWait : kProgressEvery).count()));
       waiting_ = &context;
     }
   }
@@ -196,29 +193,31 @@ absl::Status Worker::sync_once(bool* idle) {
   const std::lock_guard lock(mutex_);
   waiting_ = nullptr;
   if (!status.ok()) return from_grpc(status);
+  synced_ = Clock::now();
   seen_ = response.sequence();
+  hungry_ = static_cast<uint32_t>(response.assignments_size()) < request.room();
   for (const std::string& attempt : response.acknowledged()) {
     finished_.erase(attempt);
     std::erase(released_, attempt);
   }
-  for (const std::string& attempt : response.lost()) {
-    const auto at = running_.find(attempt);
-    if (at == running_.end()) continue;
-    at->second->lost = true;
-    at->second->cancel.cancel();
-  }
+  for (const std::string& attempt : response.lost()) lose(attempt);
   for (const auto& a : response.assignments()) {
     if (running_.contains(a.attempt()) || finished_.contains(a.attempt())) continue;  // it came twice
     auto running = std::make_shared<Running>();
-    running->task.kind = a.kind();
-    running->task.payload.assign(a.payload().begin(), a.payload().end());
-    running->task.argument.assign(a.argument().begin(), a.argument().end());
-    if (const auto inputs = to_digest(a.inputs()); inputs.ok()) running->task.inputs = *inputs;
+    running->task = to_task(a);
     running_.emplace(a.attempt(), std::move(running));
-    queue_.push_back(a.attempt());
+    queue_.emplace(std::pair(-int64_t{a.priority()}, ++arrivals_), a.attempt());
   }
   changed_.notify_all();
   return absl::OkStatus();
+}
+
+void Worker::lose(const std::string& attempt) {
+  const auto at = running_.find(attempt);
+  if (at == running_.end()) return;
+  at->second->lost = true;
+  at->second->cancel.cancel();
+  if (std::erase_if(queue_, [&](const auto& q) { return q.second == attempt; }) > 0) running_.erase(at);
 }
 
 }  // namespace lightloom

@@ -1,11 +1,10 @@
-// A worker: asks for tasks, runs them, reports. Survives a server that goes away and comes back.
+// A worker: asks for tasks, has them run, reports. Survives a server that goes away and comes back.
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <cstdint>
-#include <deque>
-#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -13,8 +12,8 @@
 #include <thread>
 #include <vector>
 
+#include "bake-worker/executor.h"
 #include "bake-worker/join.h"
-#include "core/bake/task_runner.h"
 
 namespace grpc {
 class Channel;
@@ -24,32 +23,30 @@ class ClientContext;
 namespace lightloom {
 
 struct WorkerOptions {
-  std::string name;     ///< [A-Za-z0-9._-], 1 to 64; stays the same when the process restarts
-  Introduction who;     ///< who.threads: tasks at once
-  size_t sessions = 2;  ///< levels that are kept warm
-  /// A level that is at hand, and the payload of its tasks; may be null.
-  std::vector<uint8_t> payload = {};
-  std::shared_ptr<const BakeSession> session = nullptr;
+  std::string name;  ///< [A-Za-z0-9._-], 1 to 64; stays the same when the process restarts
+  Introduction who;  ///< who.threads: tasks that compute at once
 };
 
-/// Blobs on the server, to a TaskRunner.
-std::unique_ptr<BlobAccess> remote_blobs(std::shared_ptr<grpc::Channel> channel);
-
+/// Begins somewhat more tasks than may compute, so that cores have work while results are on their way, and has more of
+/// them in hand where they are short, so that many share one Sync.
 class Worker {
  public:
-  Worker(std::shared_ptr<grpc::Channel> channel, WorkerOptions options);
+  /// The executor must outlive the worker.
+  Worker(std::shared_ptr<grpc::Channel> channel, TaskExecutor* executor, WorkerOptions options);
   ~Worker();
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
 
-  /// Works until drain() or stop(), or until the server refuses it: FailedPrecondition with the reason.
+  /// Works until drain() or stop(); until the server refuses it: FailedPrecondition with the reason; until the executor can
+  /// run no more tasks: Unavailable with the reason, when what it had is handed back.
   absl::Status run();
-  /// Takes no more tasks; run() returns when those that it has are done and on record. Any thread.
+  /// Takes no more tasks; run() returns when those that it has begun are done and on record. Any thread.
   void drain();
   /// Hands back what runs; run() returns soon. Any thread.
   void stop();
 
  private:
+  using Clock = std::chrono::steady_clock;
   struct Running {
     BakeTask task;
     std::atomic<uint64_t> rays{0};
@@ -58,21 +55,32 @@ class Worker {
   };
 
   void execute();
-  absl::Status sync_once(bool* idle);
   void run_task(const std::string& attempt, Running* running);
+  absl::Status sync_once();
+  /// These need mutex_.
+  void drain_locked();
+  uint32_t room() const;
+  bool has_news() const { return !finished_.empty() || !released_.empty(); }
+  Clock::time_point next_sync() const;
+  void tell();
+  void lose(const std::string& attempt);
 
   std::shared_ptr<grpc::Channel> channel_;
+  TaskExecutor& executor_;
   const WorkerOptions options_;
-  std::unique_ptr<BlobAccess> blobs_;
-  TaskRunner runner_;
 
   std::mutex mutex_;  // guards all below
   std::condition_variable changed_;
   bool draining_ = false, stopping_ = false, ended_ = false;
-  std::map<std::string, std::shared_ptr<Running>> running_;
-  std::deque<std::string> queue_;                               // assigned, not begun
+  std::map<std::string, std::shared_ptr<Running>> running_;     // by attempt: begun or not
+  std::map<std::pair<int64_t, uint64_t>, std::string> queue_;   // not begun, by (-priority, arrival)
   std::map<std::string, absl::StatusOr<TaskOutput>> finished_;  // to be reported until acknowledged
   std::vector<std::string> released_;
+  absl::Status health_;                    // the executor's
+  bool hungry_ = true;                     // the server had less than there was room for
+  Clock::time_point synced_, news_since_;  // last answer; first news since the last Sync was sent
+  double mean_seconds_ = 0;                // of recent tasks; 0: not known
+  uint64_t arrivals_ = 0;
   grpc::ClientContext* waiting_ = nullptr;  // a Sync that news should end
   uint64_t incarnation_ = 0, sequence_ = 0, seen_ = 0;
   std::vector<std::thread> threads_;

@@ -8,6 +8,9 @@
 
 #include "cli/bake_options.h"
 #include "cli/command.h"
+#include "cli/farm_command.h"
+#include "cli/farm_print.h"
+#include "cli/farm_steps.h"
 #include "cli/files.h"
 #include "cli/interrupt.h"
 #include "cli/level.h"
@@ -24,7 +27,7 @@ struct Options {
   std::string scene, output;
   BakeOptions how;
   int threads = 0;
-  bool json = false;
+  FarmOptions farm;  // its server empty: on this machine
 };
 
 /// Of this process, bytes.
@@ -34,37 +37,52 @@ uint64_t peak_memory() {
   return 1024 * static_cast<uint64_t>(usage.ru_maxrss);
 }
 
-nlohmann::json to_json(const BakeReport& r) {
+/// What the asset says.
+nlohmann::json asset_json(const BakeReport& r) {
   return {
       {"receivers", r.receivers},
       {"probes", r.probes},
       {"probes_repair", r.repairs},
       {"cells", r.cells},
       {"clusters", r.clusters},
-      {"clusters_reused", r.clusters_reused},
       {"coefficients_per_receiver", r.coefficients},
       {"rays_gather", r.rays_gather},
-      {"rays_visibility", r.rays_visibility},
       {"rays_relight", r.rays_relight},
       {"unseen_fraction", r.rays_gather > 0 ? static_cast<double>(r.unseen) / static_cast<double>(r.rays_gather) : 0.0},
-      {"seconds",
-       {{"total", r.seconds_total},
-        {"plan", r.seconds_plan},
-        {"receivers", r.seconds_receivers},
-        {"probes", r.seconds_probes},
-        {"transport", r.seconds_transport},
-        {"compress", r.seconds_compress},
-        {"relight", r.seconds_relight},
-        {"write", r.seconds_write}}},
+      {"seconds", {{"total", r.seconds_total}, {"write", r.seconds_write}}},
       {"bytes",
        {{"total", r.bytes_total},
         {"projection", r.bytes_projection},
         {"reconstruction", r.bytes_reconstruction},
-        {"relight", r.bytes_relight},
-        {"peak_memory", peak_memory()}}}};
+        {"relight", r.bytes_relight}}}};
 }
 
-void print(const std::string& output, const BakeReport& r) {
+nlohmann::json to_json(const BakeReport& r) {
+  nlohmann::json out = asset_json(r);
+  out.update({{"clusters_reused", r.clusters_reused},
+              {"rays_visibility", r.rays_visibility},
+              {"seconds",
+               {{"plan", r.seconds_plan},
+                {"receivers", r.seconds_receivers},
+                {"probes", r.seconds_probes},
+                {"transport", r.seconds_transport},
+                {"compress", r.seconds_compress},
+                {"relight", r.seconds_relight}}},
+              {"bytes", {{"peak_memory", peak_memory()}}}},
+             /*merge_objects=*/true);
+  return out;
+}
+
+/// How long the stages took on which worker is not known here.
+nlohmann::json to_json(const FarmBake& baked) {
+  nlohmann::json out = asset_json(baked.report);
+  out["job"] = baked.job.id;
+  out["tasks"] = baked.job.tasks;
+  out["tasks_reused"] = baked.job.reused;
+  return out;
+}
+
+void print_asset(const std::string& output, const BakeReport& r) {
   std::printf("%s: %s\n", escape_controls(output).c_str(), human_bytes(static_cast<double>(r.bytes_total)).c_str());
   std::printf(
       "  %llu receivers, %llu probes (%llu of them repairs), %llu clusters in %llu cells, %.1f coefficients a "
@@ -72,25 +90,62 @@ void print(const std::string& output, const BakeReport& r) {
       static_cast<unsigned long long>(r.receivers), static_cast<unsigned long long>(r.probes),
       static_cast<unsigned long long>(r.repairs), static_cast<unsigned long long>(r.clusters),
       static_cast<unsigned long long>(r.cells), r.coefficients);
+}
+
+void print_unseen(const BakeReport& r) {
+  std::printf("  unseen by any probe: %.4f %% of gather rays\n",
+              r.rays_gather > 0 ? 100.0 * static_cast<double>(r.unseen) / static_cast<double>(r.rays_gather) : 0.0);
+}
+
+void print(const std::string& output, const BakeReport& r) {
+  print_asset(output, r);
   const double rays = static_cast<double>(r.rays_gather + r.rays_visibility);
   std::printf("  %s: plan %s, transport %s (%srays, %srays/s), compression %s\n",
               human_seconds(r.seconds_total).c_str(), human_seconds(r.seconds_plan).c_str(),
               human_seconds(r.seconds_transport).c_str(), human_count(rays).c_str(),
               human_count(r.seconds_transport > 0 ? rays / r.seconds_transport : 0).c_str(),
               human_seconds(r.seconds_compress).c_str());
-  std::printf("  unseen by any probe: %.4f %% of gather rays\n",
-              r.rays_gather > 0 ? 100.0 * static_cast<double>(r.unseen) / static_cast<double>(r.rays_gather) : 0.0);
+  print_unseen(r);
+}
+
+void print(const std::string& output, const FarmBake& baked) {
+  print_asset(output, baked.report);
+  std::printf("  %s as job %llu: %s, %srays, fetched in %s\n", human_seconds(baked.report.seconds_total).c_str(),
+              static_cast<unsigned long long>(baked.job.id), progress_line(baked.job).c_str(),
+              human_count(static_cast<double>(baked.job.rays)).c_str(),
+              human_seconds(baked.report.seconds_write).c_str());
+  print_unseen(baked.report);
 }
 
 absl::Status check(Options* o) {
   LL_RETURN_IF_ERROR(o->how.check());
   LL_RETURN_IF_ERROR(check_threads(o->threads));
-  LL_RETURN_IF_ERROR(check_input(o->scene));
+  if (o->farm.server.empty()) {
+    LL_RETURN_IF_ERROR(check_input(o->scene));
+  } else {
+    LL_RETURN_IF_ERROR(o->farm.check());
+    LL_RETURN_IF_ERROR(check_farm_level(o->scene));
+    if (o->threads != 0) {
+      return absl::InvalidArgumentError("--threads is for bakes on this machine; each worker of a farm has its own");
+    }
+  }
   return OutputCheck({o->scene}).loom("-o", o->output);
+}
+
+absl::Status run_on_farm(const Options& o) {
+  FarmClient farm = o.farm.connect();
+  LL_ASSIGN_OR_RETURN(const FarmBake baked, farm_bake(&farm, o.farm.server, o.scene, o.how.params, o.output));
+  if (o.farm.json) {
+    print_json(to_json(baked));
+  } else {
+    print(o.output, baked);
+  }
+  return absl::OkStatus();
 }
 
 absl::Status run(const Options& o) {
   cancel_on_interrupt();
+  if (!o.farm.server.empty()) return run_on_farm(o);
   LL_ASSIGN_OR_RETURN(const Level level, load_level(o.scene));
   ProgressBar bar;
   BakeControl control;
@@ -101,7 +156,7 @@ absl::Status run(const Options& o) {
   };
   LL_ASSIGN_OR_RETURN(const BakeReport report, local_bake(*level.tracer, o.how.params, o.output, control));
   bar.finish();
-  if (o.json) {
+  if (o.farm.json) {
     print_json(to_json(report));
   } else {
     print(o.output, report);
@@ -117,7 +172,11 @@ Command bake_command() {
                                  {"-o,--output", "OUT.loom, a folder", &o->output, true}};
   for (Option& option : o->how.options()) options.push_back(std::move(option));
   options.push_back({"--threads", "0: one per hardware thread", &o->threads});
-  options.push_back({"--json", "print the report as JSON", &o->json});
+  Option server = o->farm.server_option(/*required=*/false);
+  server.help += ", which bakes it; empty: this machine does";
+  options.push_back(std::move(server));
+  options.push_back(o->farm.timeout_option());
+  options.push_back({"--json", "print the report as JSON", &o->farm.json});
   return {"bake", "Bake a level into a .loom asset", std::move(options), [o] { return check(o.get()); },
           [o] { return run(*o); }};
 }

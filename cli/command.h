@@ -41,6 +41,7 @@ Command list_command();
 Command make_scene_command();
 Command reference_command();
 Command render_command();
+Command set_priority_command();
 Command submit_command();
 Command verify_command();
 Command watch_command();

@@ -49,15 +49,53 @@ RemoteJob to_job(const v1::Job& in) {
   out.done = in.tasks_done();
   out.running = in.tasks_running();
   out.failed = in.tasks_failed();
+  out.reused = in.tasks_reused();
   out.rays = in.rays();
   out.rays_per_second = in.rays_per_second();
   out.workers = in.workers();
   out.revision = in.revision();
-  out.error = printable(in.error(), 1000);
+  out.error = escape_controls(in.error().substr(0, 1000));
   for (const std::string& bytes : in.outputs()) {
     out.outputs.push_back(to_digest(bytes).value_or(Digest{}));
   }
   return out;
+}
+
+/// Tells of a job's states above `revision` until the job, the connection or patience ends, and of nothing new (null) ten
+/// times a second.
+grpc::Status follow(v1::JobService::Stub* jobs, uint64_t id, uint64_t revision, const CancelFlag& cancel,
+                    const std::function<void(const v1::Job*)>& tell) {
+  enum Step : intptr_t { kStarted = 1, kRead, kFinished };
+  const auto tag = [](Step step) { return reinterpret_cast<void*>(step); };
+  v1::WatchJobRequest request;
+  request.set_id(id);
+  request.set_after_revision(revision);
+  grpc::ClientContext context;  // no deadline: a job may take days
+  grpc::CompletionQueue queue;
+  const auto reader = jobs->PrepareAsyncWatchJob(&context, request, &queue);
+  reader->StartCall(tag(kStarted));
+  v1::Job job;
+  grpc::Status status;
+  void* step = nullptr;
+  bool ok = false;
+  while (step != tag(kFinished)) {
+    const auto tick = std::chrono::system_clock::now() + std::chrono::milliseconds(100);
+    if (queue.AsyncNext(&step, &ok, tick) != grpc::CompletionQueue::GOT_EVENT) {
+      if (cancel.cancelled()) context.TryCancel();
+      tell(nullptr);
+    } else if (step == tag(kRead) && ok) {
+      tell(&job);
+      reader->Read(&job, tag(kRead));
+    } else if (step == tag(kStarted) && ok) {
+      reader->Read(&job, tag(kRead));
+    } else if (step != tag(kFinished)) {
+      reader->Finish(&status, tag(kFinished));
+    }
+  }
+  queue.Shutdown();
+  while (queue.Next(&step, &ok)) {
+  }
+  return status;
 }
 
 std::string new_request_id() {
@@ -70,8 +108,12 @@ std::string new_request_id() {
 }  // namespace
 
 struct FarmClient::Connection {
-  explicit Connection(std::shared_ptr<grpc::Channel> to)
-      : channel(std::move(to)), jobs(v1::JobService::NewStub(channel)), blobs(channel) {}
+  Connection(std::shared_ptr<grpc::Channel> to, Patience its_patience)
+      : patience(std::move(its_patience)),
+        channel(std::move(to)),
+        jobs(v1::JobService::NewStub(channel)),
+        blobs(channel, patience) {}
+  Patience patience;
   std::shared_ptr<grpc::Channel> channel;
   std::unique_ptr<v1::JobService::Stub> jobs;
   BlobClient blobs;
@@ -80,17 +122,27 @@ struct FarmClient::Connection {
   absl::Status call(grpc::Status (v1::JobService::Stub::*method)(grpc::ClientContext*, const Request&, Response*),
                     const Request& request, Response* response) {
     return call_with_retries(
-        {}, [&](grpc::ClientContext* context) { return ((*jobs).*method)(context, request, response); });
+        patience, [&](grpc::ClientContext* context) { return ((*jobs).*method)(context, request, response); });
   }
 };
 
-FarmClient::FarmClient(const std::string& server) : FarmClient(dial(server), server) {}
+FarmClient::FarmClient(const std::string& server, std::chrono::milliseconds patience, const CancelFlag* cancel)
+    : server_(server) {
+  Patience p;
+  p.total = patience;
+  p.call = std::min(p.call, patience);
+  if (cancel != nullptr) p.give_up = [cancel] { return cancel->cancelled(); };
+  connection_ = std::make_unique<Connection>(dial(server), std::move(p));
+}
 FarmClient::FarmClient(std::shared_ptr<grpc::Channel> channel, std::string server)
-    : server_(std::move(server)), connection_(std::make_unique<Connection>(std::move(channel))) {}
+    : server_(std::move(server)), connection_(std::make_unique<Connection>(std::move(channel), Patience())) {}
 FarmClient::~FarmClient() = default;
 
 absl::Status FarmClient::in_words(const absl::Status& status) const {
   if (status.ok()) return status;
+  if (const auto& gave_up = connection_->patience.give_up; gave_up && gave_up()) {
+    return absl::CancelledError("stopped while " + server_ + " was asked");
+  }
   if (absl::IsUnavailable(status) || absl::IsDeadlineExceeded(status)) {
     return absl::UnavailableError(server_ + " does not answer (" + std::string(status.message()) +
                                   "); is lightloom-server running there?");
@@ -167,6 +219,15 @@ absl::StatusOr<RemoteJob> FarmClient::cancel(uint64_t id) {
   return to_job(job);
 }
 
+absl::StatusOr<RemoteJob> FarmClient::set_priority(uint64_t id, int32_t priority) {
+  v1::SetPriorityRequest request;
+  request.set_id(id);
+  request.set_priority(priority);
+  v1::Job job;
+  LL_RETURN_IF_ERROR(in_words(connection_->call(&v1::JobService::Stub::SetPriority, request, &job)));
+  return to_job(job);
+}
+
 absl::StatusOr<std::vector<RemoteWorker>> FarmClient::workers() {
   v1::ListWorkersResponse response;
   LL_RETURN_IF_ERROR(
@@ -190,8 +251,8 @@ absl::StatusOr<std::vector<RemoteEvent>> FarmClient::events(uint64_t job) {
     LL_RETURN_IF_ERROR(in_words(connection_->call(&v1::JobService::Stub::ListEvents, request, &response)));
     if (response.events().empty()) return out;
     for (const auto& e : response.events()) {
-      out.push_back(
-          {e.id(), e.at_ms(), printable(e.task(), 100), printable(e.worker(), 64), printable(e.what(), 1100)});
+      out.push_back({e.id(), e.at_ms(), printable(e.task(), 100), printable(e.worker(), 64),
+                     escape_controls(e.what().substr(0, 1100))});
     }
   }
 }
@@ -199,37 +260,32 @@ absl::StatusOr<std::vector<RemoteEvent>> FarmClient::events(uint64_t job) {
 absl::StatusOr<RemoteJob> FarmClient::watch(uint64_t id, const CancelFlag& cancel,
                                             const std::function<void(const RemoteJob&)>& changed) {
   RemoteJob last;
-  Patience patience;
-  patience.call = std::chrono::hours(24);
-  patience.give_up = [&] { return cancel.cancelled() || last.ended(); };
-  last.state = "running";
-  while (!last.ended()) {
-    const absl::Status status = call_with_retries(patience, [&](grpc::ClientContext* context) {
-      v1::WatchJobRequest request;
-      request.set_id(id);
-      request.set_after_revision(last.revision);
-      const auto reader = connection_->jobs->WatchJob(context, request);
-      v1::Job job;
-      while (reader->Read(&job)) {
-        last = to_job(job);
-        changed(last);
-        if (cancel.cancelled()) context->TryCancel();
-      }
-      return reader->Finish();
-    });
+  for (;;) {
+    // Waits for a server that is not there, or not yet again: the stream has no deadline that would.
+    LL_ASSIGN_OR_RETURN(const RemoteJob now, job(id));
+    if (now.revision >= last.revision) last = now;
+    changed(last);
+    if (last.ended()) return last;
+    const absl::Status end =
+        from_grpc(follow(connection_->jobs.get(), id, last.revision, cancel, [&](const v1::Job* job) {
+          if (job != nullptr) last = to_job(*job);
+          changed(last);
+        }));
+    if (last.ended()) return last;
     if (cancel.cancelled()) return absl::CancelledError("stopped watching; the job goes on");
-    if (!status.ok() && !last.ended()) return in_words(status);
+    const bool server_ended = absl::IsUnavailable(end) || absl::IsCancelled(end) || absl::IsUnimplemented(end);
+    if (!end.ok() && !server_ended) return in_words(end);
   }
-  return last;
 }
 
 absl::StatusOr<Manifest> FarmClient::fetch(uint64_t id, const std::string& loom, const CancelFlag& cancel,
                                            const std::function<void(uint64_t, uint64_t)>& progress) {
   LL_ASSIGN_OR_RETURN(const RemoteJob job, this->job(id));
   if (job.state != "done" || job.outputs.empty()) {
-    return absl::FailedPreconditionError(
-        "job " + std::to_string(id) + " is " + job.state + (job.error.empty() ? "" : " (" + job.error + ")") +
-        "; only what is done can be fetched" + (job.ended() ? "" : ": lightloom watch " + std::to_string(id)));
+    return absl::FailedPreconditionError("job " + std::to_string(id) + " of " + server_ + " is " + job.state +
+                                         (job.error.empty() ? "" : " (" + job.error + ")") +
+                                         "; only what is done can be fetched" +
+                                         (job.ended() ? "" : ": lightloom watch " + std::to_string(id)));
   }
   const auto bytes = connection_->blobs.download(job.outputs.front());
   if (!bytes.ok()) return in_words(bytes.status());

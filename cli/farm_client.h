@@ -1,6 +1,7 @@
 // A bake farm, to the commands: plain structs and calls.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -25,6 +26,7 @@ struct RemoteJob {
   std::string state;  ///< running, done, partial, failed, cancelled
   int64_t created_ms = 0, finished_ms = 0;
   uint64_t tasks = 0, done = 0, running = 0, failed = 0, rays = 0;
+  uint64_t reused = 0;  ///< of those done: taken from an earlier job
   double rays_per_second = 0;
   uint32_t workers = 0;
   uint64_t revision = 0;
@@ -47,10 +49,12 @@ struct RemoteEvent {
   std::string task, worker, what;
 };
 
-/// Calls wait up to half a minute for a server that is not there; errors name its address.
+/// Calls wait for a server that is not there, for as long as `patience`; errors name its address.
 class FarmClient {
  public:
-  explicit FarmClient(const std::string& server);
+  /// `cancel`, if any, ends uploads, and waiting for a server: Cancelled.
+  explicit FarmClient(const std::string& server, std::chrono::milliseconds patience = std::chrono::seconds(30),
+                      const CancelFlag* cancel = nullptr);
   /// Over a channel that is at hand; `server` names it in errors.
   FarmClient(std::shared_ptr<grpc::Channel> channel, std::string server);
   ~FarmClient();
@@ -64,9 +68,11 @@ class FarmClient {
   absl::StatusOr<RemoteJob> job(uint64_t id);
   absl::StatusOr<std::vector<RemoteJob>> jobs();
   absl::StatusOr<RemoteJob> cancel(uint64_t id);
+  absl::StatusOr<RemoteJob> set_priority(uint64_t id, int32_t priority);
   absl::StatusOr<std::vector<RemoteWorker>> workers();
   absl::StatusOr<std::vector<RemoteEvent>> events(uint64_t job);
-  /// Calls back with each state until the job ends, and returns the last one. Goes on over a server that restarts.
+  /// Calls back with each state until the job ends, and ten times a second with the last one meanwhile. Returns the last
+  /// one. Goes on over a server that restarts. Cancelled: the job goes on.
   absl::StatusOr<RemoteJob> watch(uint64_t id, const CancelFlag& cancel,
                                   const std::function<void(const RemoteJob&)>& changed);
   /// Writes a finished job's asset; chunks that are there already are not fetched. FailedPrecondition unless it is done.

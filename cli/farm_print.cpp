@@ -1,9 +1,10 @@
 #include "cli/farm_print.h"
 
+#include <cstdio>
 #include <ctime>
-
 #include <nlohmann/json.hpp>
 
+#include "cli/print_json.h"
 #include "cli/progress.h"
 
 namespace lightloom {
@@ -20,16 +21,27 @@ nlohmann::json to_json(const RemoteJob& job) {
           {"tasks_done", job.done},
           {"tasks_running", job.running},
           {"tasks_failed", job.failed},
+          {"tasks_reused", job.reused},
           {"rays", job.rays},
           {"rays_per_second", job.rays_per_second},
           {"workers", job.workers},
           {"error", job.error}};
 }
 
+void print_job(const RemoteJob& job, const std::string& what, bool json) {
+  if (json) {
+    print_json(to_json(job));
+  } else {
+    std::printf("job %llu: %s\n", static_cast<unsigned long long>(job.id), what.c_str());
+  }
+}
+
 std::string progress_line(const RemoteJob& job) {
   std::string line = std::to_string(job.done) + " of " + std::to_string(job.tasks) + " tasks";
+  if (job.reused > 0) line += " (" + std::to_string(job.reused) + " reused)";
   if (job.failed > 0) line += ", " + std::to_string(job.failed) + " failed";
   if (job.ended()) return line;
+  if (job.workers == 0) return line + ", waiting for a worker";
   line += ", " + std::to_string(job.running) + " running on " + std::to_string(job.workers) +
           (job.workers == 1 ? " worker" : " workers");
   if (job.rays_per_second > 0) line += ", " + human_count(job.rays_per_second) + "rays/s";

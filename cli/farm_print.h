@@ -9,7 +9,9 @@
 namespace lightloom {
 
 nlohmann::json to_json(const RemoteJob& job);
-/// "12 of 650 tasks, 2 running on 2 workers, 2.31 M rays/s".
+/// A command's result: "job 7: <what>", or the job as JSON.
+void print_job(const RemoteJob& job, const std::string& what, bool json);
+/// "12 of 650 tasks, 1 failed, 2 running on 2 workers, 2.31 Mrays/s".
 std::string progress_line(const RemoteJob& job);
 /// OK for a job that is done; else an error that says how it ended.
 absl::Status how_it_ended(const RemoteJob& job);

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "bake-server/grpc/server.h"
+#include "bake-worker/local_executor.h"
 #include "bake-worker/worker.h"
 #include "cli/farm_client.h"
 #include "core/base/stopwatch.h"
@@ -20,8 +21,8 @@ namespace {
 /// A worker and its thread, ended with it.
 class LocalWorker {
  public:
-  LocalWorker(std::shared_ptr<grpc::Channel> channel, WorkerOptions options)
-      : worker_(std::move(channel), std::move(options)), thread_([this] { (void)worker_.run(); }) {}
+  LocalWorker(std::shared_ptr<grpc::Channel> channel, TaskExecutor* executor, WorkerOptions options)
+      : worker_(std::move(channel), executor, std::move(options)), thread_([this] { (void)worker_.run(); }) {}
   ~LocalWorker() {
     worker_.stop();
     thread_.join();
@@ -51,8 +52,9 @@ absl::Status stopped(const std::string& loom, const RemoteJob& job) {
 
 /// The job until it ends, or the bake is cancelled.
 absl::StatusOr<RemoteJob> run_job(RemoteJob job, FarmClient* client, std::shared_ptr<grpc::Channel> channel,
-                                  WorkerOptions options, const std::string& loom, const BakeControl& control) {
-  const LocalWorker worker(std::move(channel), std::move(options));
+                                  TaskExecutor* executor, const std::string& loom, const BakeControl& control) {
+  const auto threads = static_cast<uint32_t>(thread_count(control.threads));
+  const LocalWorker worker(std::move(channel), executor, {"this", introduce_this_machine(threads)});
   const CancelFlag never;
   const auto end =
       client->watch(job.id, control.cancel != nullptr ? *control.cancel : never, [&](const RemoteJob& now) {
@@ -87,10 +89,9 @@ absl::StatusOr<BakeReport> local_bake(const RayTracer& tracer, const BakeParams&
     if (other.id != job.id && !other.ended()) LL_RETURN_IF_ERROR(client.cancel(other.id).status());
   }
   if (!job.ended()) {
-    const auto threads = static_cast<uint32_t>(thread_count(control.threads));
-    WorkerOptions worker{"this", introduce_this_machine(threads), 1, payload, session};
-    LL_ASSIGN_OR_RETURN(
-        job, run_job(std::move(job), &client, server->in_process_channel(), std::move(worker), loom, control));
+    LocalExecutor executor(server->in_process_channel(), static_cast<uint32_t>(thread_count(control.threads)), 0);
+    executor.adopt(payload, session);
+    LL_ASSIGN_OR_RETURN(job, run_job(std::move(job), &client, server->in_process_channel(), &executor, loom, control));
   }
   const auto forget = [&] {
     server.reset();

@@ -113,10 +113,10 @@ int run(int argc, char** argv) {
   CLI::App app("lightloom: bakes the light of a level so that it can be relit in real time", "lightloom");
   app.set_version_flag("--version", std::string(kVersion) + ", method " + std::string(kMethodVersion));
   app.require_subcommand(1);
-  const std::vector<Command> commands = {bake_command(),      inspect_command(), verify_command(),     render_command(),
-                                         reference_command(), compare_command(), make_scene_command(), submit_command(),
-                                         watch_command(),     list_command(),    cancel_command(),     fetch_command(),
-                                         workers_command(),   events_command()};
+  const std::vector<Command> commands = {
+      bake_command(),    inspect_command(),    verify_command(),       render_command(),  reference_command(),
+      compare_command(), make_scene_command(), submit_command(),       watch_command(),   list_command(),
+      cancel_command(),  fetch_command(),      set_priority_command(), workers_command(), events_command()};
   const Command* chosen = nullptr;
   for (const Command& command : commands) {
     CLI::App* sub = app.add_subcommand(command.name, command.help);

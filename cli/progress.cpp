@@ -1,7 +1,9 @@
 #include "cli/progress.h"
 
+#include <sys/ioctl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 
@@ -46,29 +48,59 @@ std::string human_seconds(double s) {
   return text;
 }
 
+std::string Eta::text(uint64_t done, uint64_t total) {
+  const auto now = std::chrono::steady_clock::now();
+  if (total != total_) {
+    total_ = total;
+    first_ = done;
+    started_ = now;
+  }
+  if (done <= first_ || done >= total) return "";
+  const double seconds = std::chrono::duration<double>(now - started_).count();
+  return "ETA " + human_seconds(seconds / static_cast<double>(done - first_) * static_cast<double>(total - done));
+}
+
 ProgressBar::ProgressBar() : on_(::isatty(STDERR_FILENO) == 1), started_(Clock::now()), last_(started_) {}
 
 void ProgressBar::update(const std::string& stage, uint64_t done, uint64_t total, uint64_t rays) {
+  if (stage != stage_) {
+    eta_ = Eta();
+    started_ = Clock::now();
+    first_rays_ = rays;
+  }
+  const double seconds = std::chrono::duration<double>(Clock::now() - started_).count();
+  const uint64_t shot = rays - std::min(rays, first_rays_);
+  std::string words = human_seconds(seconds);
+  if (const std::string eta = eta_.text(done, total); !eta.empty()) words += ", " + eta;
+  if (shot > 0 && seconds > 0) words += ", " + human_count(static_cast<double>(shot) / seconds) + "rays/s";
+  draw(stage, done, total, words);
+}
+
+void ProgressBar::draw(const std::string& stage, uint64_t done, uint64_t total, const std::string& words) {
   const auto now = Clock::now();
   if (stage != stage_) {
     finish();
     stage_ = stage;
-    started_ = now;
   } else if (done < total && now - last_ < std::chrono::milliseconds(100)) {
     return;
   }
   last_ = now;
   if (!on_ || total == 0) return;
   const double share = static_cast<double>(done) / static_cast<double>(total);
-  const double seconds = std::chrono::duration<double>(now - started_).count();
-  constexpr int kWidth = 30;
-  const int filled = static_cast<int>(share * kWidth);
-  std::string bar(static_cast<size_t>(filled), '=');
+  constexpr int kWidth = 20;
+  std::string bar(static_cast<size_t>(share * kWidth), '=');
   bar.resize(kWidth, ' ');
-  const std::string eta = share > 0 && done < total ? " ETA " + human_seconds(seconds / share - seconds) : "";
-  const std::string rate = rays > 0 && seconds > 0 ? human_count(static_cast<double>(rays) / seconds) + "rays/s" : "";
-  std::fprintf(stderr, "\r\033[K%-22s [%s] %3.0f %%  %s%s  %s", stage.c_str(), bar.c_str(), share * 100,
-               human_seconds(seconds).c_str(), eta.c_str(), rate.c_str());
+  char percent[16];
+  std::snprintf(percent, sizeof percent, "%3.0f %%", share * 100);
+  std::string line = stage;
+  line.resize(std::max<size_t>(line.size(), 9), ' ');
+  line += " [" + bar + "] " + percent + "  " + words;
+  // A line that wraps would not be drawn over.
+  winsize window{};
+  if (::ioctl(STDERR_FILENO, TIOCGWINSZ, &window) == 0 && window.ws_col > 1) {
+    line.resize(std::min<size_t>(line.size(), window.ws_col - 1));
+  }
+  std::fprintf(stderr, "\r\033[K%s", line.c_str());
   drawn_ = true;
 }
 

@@ -3,21 +3,15 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "cli/command.h"
-#include "cli/farm_client.h"
+#include "cli/farm_command.h"
 #include "cli/print_json.h"
 #include "cli/progress.h"
 
 namespace lightloom {
 namespace {
 
-struct Options {
-  std::string server;
-  bool json = false;
-};
-
-absl::Status run(const Options& o) {
-  FarmClient farm(o.server);
+absl::Status run(const FarmOptions& o) {
+  FarmClient farm = o.connect();
   LL_ASSIGN_OR_RETURN(const std::vector<RemoteWorker> workers, farm.workers());
   if (o.json) {
     nlohmann::json all = nlohmann::json::array();
@@ -43,12 +37,8 @@ absl::Status run(const Options& o) {
 }  // namespace
 
 Command workers_command() {
-  const auto o = std::make_shared<Options>();
-  return {"workers",
-          "Show who bakes at a farm",
-          {{"--server", "HOST:PORT of lightloom-server", &o->server, true}, {"--json", "print them as JSON", &o->json}},
-          [] { return absl::OkStatus(); },
-          [o] { return run(*o); }};
+  const auto o = std::make_shared<FarmOptions>();
+  return farm_command("workers", "Show who bakes at a farm", o, {}, [o] { return run(*o); });
 }
 
 }  // namespace lightloom

@@ -14,6 +14,7 @@ namespace lightloom {
 namespace {
 
 constexpr size_t kPiece = size_t{1} << 20;
+constexpr std::chrono::seconds kServerStops{2};
 /// Another try may find the server there, or the upload where it is.
 bool is_worth_another_try(const grpc::Status& status) {
   switch (status.error_code()) {
@@ -21,6 +22,7 @@ bool is_worth_another_try(const grpc::Status& status) {
     case grpc::StatusCode::DEADLINE_EXCEEDED:
     case grpc::StatusCode::ABORTED:
     case grpc::StatusCode::DATA_LOSS:
+    case grpc::StatusCode::CANCELLED:  // by a server that stops: who cancels here gives up, too
       return true;
     default:
       return false;
@@ -51,14 +53,18 @@ absl::Status from_grpc(const grpc::Status& status) {
 
 absl::Status call_with_retries(const Patience& patience,
                                const std::function<grpc::Status(grpc::ClientContext*)>& call) {
-  const auto end = std::chrono::steady_clock::now() + patience.total;
+  const auto begun = std::chrono::steady_clock::now(), end = begun + patience.total;
   auto pause = std::chrono::milliseconds(50);
   for (;;) {
     grpc::ClientContext context;
     context.set_deadline(std::chrono::system_clock::now() + patience.call);
     const grpc::Status status = call(&context);
     const auto now = std::chrono::steady_clock::now();
-    if (!is_worth_another_try(status) || now + pause > end || (patience.give_up && patience.give_up())) {
+    const bool full = patience.wait_for_room && status.error_code() == grpc::StatusCode::RESOURCE_EXHAUSTED;
+    // So gRPC answers calls that come while its server stops; else something other listens there.
+    const bool stopping = status.error_code() == grpc::StatusCode::UNIMPLEMENTED && now < begun + kServerStops;
+    if ((!is_worth_another_try(status) && !full && !stopping) || now + pause > end ||
+        (patience.give_up && patience.give_up())) {
       return from_grpc(status);
     }
     std::mutex mutex;
@@ -72,18 +78,24 @@ absl::StatusOr<Digest> BlobClient::upload(std::span<const uint8_t> bytes,
                                           const std::function<void(uint64_t)>& progress) const {
   const auto stub = v1::BlobService::NewStub(channel_);
   const Digest digest = sha256(bytes);
+  bool ask = bytes.size() > kPiece;  // how much is there: a small blob is sent sooner
   LL_RETURN_IF_ERROR(call_with_retries(patience_, [&](grpc::ClientContext* context) {
-    v1::GetUploadRequest question;
-    question.set_digest(to_bytes(digest));
-    v1::GetUploadResponse there;
-    if (const grpc::Status status = stub->GetUpload(context, question, &there); !status.ok()) return status;
-    if (there.complete()) return grpc::Status::OK;
+    size_t at = 0;
+    if (ask) {
+      v1::GetUploadRequest question;
+      question.set_digest(to_bytes(digest));
+      v1::GetUploadResponse there;
+      if (const grpc::Status status = stub->GetUpload(context, question, &there); !status.ok()) return status;
+      if (there.complete()) return grpc::Status::OK;
+      at = std::min<size_t>(there.offset(), bytes.size());
+    }
+    ask = true;
 
     grpc::ClientContext stream;
     stream.set_deadline(std::chrono::system_clock::now() + patience_.call + std::chrono::seconds(bytes.size() >> 20));
+    stream.set_initial_metadata_corked(true);  // goes out with the first piece
     v1::WriteResponse response;
     const auto writer = stub->Write(&stream, &response);
-    size_t at = std::min<size_t>(there.offset(), bytes.size());
     v1::WriteRequest piece;
     piece.set_digest(to_bytes(digest));
     piece.set_size(bytes.size());
@@ -91,12 +103,14 @@ absl::StatusOr<Digest> BlobClient::upload(std::span<const uint8_t> bytes,
     do {
       const auto data = bytes.subspan(at, std::min(kPiece, bytes.size() - at));
       piece.set_data(data.data(), data.size());
-      if (!writer->Write(piece)) break;
       at += data.size();
+      grpc::WriteOptions options;
+      if (at == bytes.size()) options.set_last_message();
+      if (patience_.give_up && patience_.give_up()) stream.TryCancel();
+      if (!writer->Write(piece, options)) break;
       if (progress) progress(at);
       piece.Clear();
     } while (at < bytes.size());
-    writer->WritesDone();
     return writer->Finish();
   }));
   return digest;

@@ -31,6 +31,7 @@ struct Patience {
   std::chrono::milliseconds total{30'000};
   std::chrono::milliseconds call{10'000};  ///< deadline of one try
   std::function<bool()> give_up;           ///< null: never earlier
+  bool wait_for_room = false;              ///< the other side's full disk, too, is worth another try
 };
 
 /// Calls until it succeeds, fails for a reason that another try cannot mend, or patience ends. REQUIRES: repeating it is

@@ -122,6 +122,13 @@ bool BlobStore::has(const Digest& digest) const {
   return touch(path) || (restore_blob(layout_, digest) && touch(path));
 }
 
+absl::Status BlobStore::require(const std::vector<Digest>& digests) const {
+  for (const Digest& digest : digests) {
+    if (!has(digest)) return absl::InvalidArgumentError("blob " + digest.hex() + " is not here; upload it first");
+  }
+  return absl::OkStatus();
+}
+
 absl::StatusOr<uint64_t> BlobStore::size(const Digest& digest) const {
   std::error_code error;
   uint64_t size = fs::file_size(layout_.blob(digest), error);
@@ -153,7 +160,11 @@ absl::Status BlobStore::append(const Digest& digest, uint64_t size, uint64_t off
   const auto mine = turn(digest);
   const std::lock_guard lock(*mine);
   if (has(digest)) return absl::OkStatus();
-  if (check_room_) LL_RETURN_IF_ERROR(check_room_());
+  if (const absl::Status room = check_room_ ? check_room_() : absl::OkStatus(); !room.ok()) {
+    std::error_code ignored;
+    fs::remove(layout_.part(digest), ignored);  // or it would fill the disk and wait for others to make room
+    return room;
+  }
   if (uploaded(digest) > size) {  // somebody else gave another size
     std::error_code ignored;
     fs::remove(layout_.part(digest), ignored);
@@ -162,7 +173,11 @@ absl::Status BlobStore::append(const Digest& digest, uint64_t size, uint64_t off
     return absl::AbortedError("the upload of blob " + digest.hex() + " is at byte " + std::to_string(uploaded(digest)) +
                               "; go on there");
   }
-  LL_RETURN_IF_ERROR(write_at(layout_.part(digest), offset, data));
+  if (const absl::Status written = write_at(layout_.part(digest), offset, data); !written.ok()) {
+    std::error_code ignored;
+    fs::remove(layout_.part(digest), ignored);  // on a full disk it would leave no room for anything else
+    return written;
+  }
   if (offset + data.size() < size) return absl::OkStatus();
 
   LL_ASSIGN_OR_RETURN(const Digest found, digest_of(layout_.part(digest)));

@@ -35,6 +35,8 @@ class BlobStore {
   /// Whether it is there; if so, it was touched, and stays for the grace period of collect_garbage() even if nothing names
   /// it. Who puts a blob's name on record asks right before.
   bool has(const Digest& digest) const;
+  /// InvalidArgument unless all are there, as by has().
+  absl::Status require(const std::vector<Digest>& digests) const;
   /// Bytes of a blob; NotFound.
   absl::StatusOr<uint64_t> size(const Digest& digest) const;
   /// At most `most` bytes from `offset` on; none at the end.
@@ -43,7 +45,8 @@ class BlobStore {
   /// Bytes of the blob that have arrived; all of them: as has().
   uint64_t uploaded(const Digest& digest) const;
   /// The next piece of a blob of `size` bytes. The last one makes the blob, if its digest is right; else what came is
-  /// dropped (DataLoss). Aborted: `offset` is not where the upload is; ask uploaded(). What check_room says.
+  /// dropped (DataLoss). Aborted: `offset` is not where the upload is; ask uploaded(). What check_room says: what came is
+  /// dropped, too.
   absl::Status append(const Digest& digest, uint64_t size, uint64_t offset, std::span<const uint8_t> data);
   /// A blob that is at hand.
   absl::StatusOr<Digest> put(std::span<const uint8_t> bytes);

@@ -78,7 +78,9 @@ absl::Status Dispatcher::record(const SyncMessage& message, Worker* worker, Sync
     forget(attempt, worker);
   };
   for (const auto& f : message.finished) {
-    const auto completion = store_->complete(f.attempt, f.outputs, f.tasks, now_ms);
+    const absl::Status there = blobs_->require(f.outputs);
+    const auto completion =
+        there.ok() ? store_->complete(f.attempt, f.outputs, f.tasks, now_ms) : absl::StatusOr<Completion>(there);
     if (absl::IsInvalidArgument(completion.status())) {
       LL_RETURN_IF_ERROR(
           store_->fail(f.attempt, std::string(completion.status().message()), now_ms, options_.max_failures).status());

@@ -45,8 +45,9 @@ struct Server::Parts {
   std::unique_ptr<grpc::Server> server;  // last: it stops before the services that it calls
 };
 
-absl::StatusOr<std::unique_ptr<Server>> Server::start(const std::string& address, const ServerInfo& info, Farm* farm) {
-  LL_RETURN_IF_ERROR(check_listen_address(address));
+absl::StatusOr<std::unique_ptr<Server>> Server::start(const std::string& address, const ServerInfo& info, Farm* farm,
+                                                      bool insecure) {
+  LL_RETURN_IF_ERROR(check_listen_address(address, insecure));
   grpc::ServerBuilder builder;
   int port = 0;
   builder.AddListeningPort(address, grpc::InsecureServerCredentials(), &port);

@@ -17,9 +17,10 @@ namespace lightloom {
 /// A running server: JobService, WorkerService, BlobService and gRPC's standard health service. Thread-safe.
 class Server {
  public:
-  /// Listens on `address` (see check_listen_address; port 0 takes a free one), serves until destroyed.
-  /// Errors: a bad address, a port in use. `farm` must outlive the server, whose end stops its coordinator.
-  static absl::StatusOr<std::unique_ptr<Server>> start(const std::string& address, const ServerInfo& info, Farm* farm);
+  /// Listens on `address` (see check_listen_address, also for `insecure`; port 0 takes a free one), serves until
+  /// destroyed. Errors: a bad address, a port in use. `farm` must outlive the server, whose end stops its coordinator.
+  static absl::StatusOr<std::unique_ptr<Server>> start(const std::string& address, const ServerInfo& info, Farm* farm,
+                                                       bool insecure = false);
 
   /// Serves this process only, by in_process_channel().
   static absl::StatusOr<std::unique_ptr<Server>> start_in_process(const ServerInfo& info, Farm* farm);

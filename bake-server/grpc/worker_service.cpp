@@ -24,6 +24,8 @@ v1::JoinResponse::Refused::Reason to_proto(Refusal refusal) {
       return Refused::MISSING_AVX2;
     case Refusal::kNoThreads:
       return Refused::NO_THREADS;
+    case Refusal::kCanary:
+      return Refused::CANARY;
     case Refusal::kNone:
       break;
   }
@@ -31,10 +33,12 @@ v1::JoinResponse::Refused::Reason to_proto(Refusal refusal) {
 }
 
 Admission admit(const v1::JoinRequest& request, const ServerInfo& info) {
+  const auto canary = to_digest(request.canary());
   return lightloom::admit({.protocol_version = request.protocol_version(),
                            .method_version = request.method_version(),
                            .avx2 = request.avx2(),
-                           .threads = request.threads()},
+                           .threads = request.threads(),
+                           .canary = canary.ok() ? std::optional(*canary) : std::nullopt},
                           info);
 }
 
@@ -67,7 +71,9 @@ absl::StatusOr<SyncMessage> to_message(const v1::SyncRequest& request) {
     LL_ASSIGN_OR_RETURN(finished.tasks, to_tasks(f.tasks()));
     out.finished.push_back(std::move(finished));
   }
-  for (const auto& f : request.failed()) out.failed.push_back({f.attempt(), printable(f.reason(), kMaxReasonBytes)});
+  for (const auto& f : request.failed()) {
+    out.failed.push_back({f.attempt(), escape_controls(f.reason().substr(0, kMaxReasonBytes))});  // keeps its quotes
+  }
   out.released.assign(request.released().begin(), request.released().end());
   return out;
 }
@@ -84,6 +90,7 @@ void to_proto(const SyncAnswer& answer, v1::SyncResponse* out) {
     to->set_payload(a.payload);
     to->set_kind(a.kind);
     to->set_argument(a.argument);
+    to->set_priority(a.priority);
     if (a.inputs) to->set_inputs(to_bytes(*a.inputs));
   }
 }

@@ -36,6 +36,14 @@ Admission admit(const WorkerInfo& worker, const ServerInfo& server) {
   if (worker.threads == 0) {
     return {Refusal::kNoThreads, "the worker offers no threads: start it with --threads 1 or more"};
   }
+  if (server.canary && worker.canary != server.canary) {
+    return {Refusal::kCanary,
+            absl::StrCat("a tiny known bake has other bytes there (",
+                         worker.canary ? worker.canary->hex().substr(0, 12) : "none", ") than it must (",
+                         server.canary->hex().substr(0, 12),
+                         "): install the server's release of lightloom, and if that is so, do not use "
+                         "this machine")};
+  }
   return {};
 }
 

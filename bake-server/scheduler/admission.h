@@ -2,7 +2,10 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
+
+#include "core/base/hash.h"
 
 namespace lightloom {
 
@@ -12,6 +15,7 @@ struct WorkerInfo {
   std::string method_version;
   bool avx2 = false;
   uint32_t threads = 0;
+  std::optional<Digest> canary = std::nullopt;  ///< what it gives for a known bake, if it says so
 };
 
 /// What the server is, and asks of its workers.
@@ -19,9 +23,10 @@ struct ServerInfo {
   std::string version;            ///< the release, for people
   uint32_t protocol_version = 0;  ///< the newest it speaks; it speaks the one before, too
   std::string method_version;
+  std::optional<Digest> canary = std::nullopt;  ///< what a worker must give for a known bake; none: any
 };
 
-enum class Refusal { kNone, kProtocolVersion, kMethodVersion, kMissingAvx2, kNoThreads };
+enum class Refusal { kNone, kProtocolVersion, kMethodVersion, kMissingAvx2, kNoThreads, kCanary };
 
 struct Admission {
   Refusal refusal = Refusal::kNone;

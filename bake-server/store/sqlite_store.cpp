@@ -476,10 +476,14 @@ class SqliteStore final : public Store {
   }
 
   // These two read over connections of their own: no lock.
-  absl::Status referenced(const VisitDigest& visit) override { return visit_references(*db_, visit); }
+  absl::Status referenced(const VisitDigest& visit) override {
+    LL_ASSIGN_OR_RETURN(const auto reader, open_sqlite_reader(db_->file().parent_path()));
+    return visit_references(*reader, visit);
+  }
 
   absl::StatusOr<std::vector<Digest>> references_of(const std::string& client) override {
-    return lightloom::references_of(*db_, client);
+    LL_ASSIGN_OR_RETURN(const auto reader, open_sqlite_reader(db_->file().parent_path()));
+    return lightloom::references_of(*reader, client);
   }
 
  private:

@@ -78,19 +78,18 @@ absl::StatusOr<Forgotten> forget_ended(Database& database, int64_t before_ms, ui
 }
 
 absl::Status visit_references(Database& database, const VisitDigest& visit) {
-  LL_ASSIGN_OR_RETURN(const auto reader, open_sqlite_reader(database.file().parent_path()));
   // One statement, one moment.
-  return visit_rows(reader->query("SELECT inputs FROM jobs UNION ALL SELECT outputs FROM tasks WHERE state = 1"),
+  return visit_rows(database.query("SELECT inputs FROM jobs UNION ALL SELECT outputs FROM tasks WHERE state = 1"),
                     visit);
 }
 
 absl::StatusOr<std::vector<Digest>> references_of(Database& database, const std::string& client) {
-  LL_ASSIGN_OR_RETURN(const auto reader, open_sqlite_reader(database.file().parent_path()));
   std::vector<Digest> digests;
   LL_RETURN_IF_ERROR(visit_rows(
-      reader->query("SELECT inputs FROM jobs WHERE client = ?1 UNION ALL SELECT t.outputs FROM jobs j"
-                    " CROSS JOIN tasks t INDEXED BY tasks_by_order ON t.job = j.id WHERE j.client = ?1 AND t.state = 1",
-                    client),
+      database.query(
+          "SELECT inputs FROM jobs WHERE client = ?1 UNION ALL SELECT t.outputs FROM jobs j"
+          " CROSS JOIN tasks t INDEXED BY tasks_by_order ON t.job = j.id WHERE j.client = ?1 AND t.state = 1",
+          client),
       [&](const Digest& digest) {
         digests.push_back(digest);
         return true;

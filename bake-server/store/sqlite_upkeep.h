@@ -1,5 +1,4 @@
-// What keeps the database in bounds, and what others than the server read of it. What only reads has a connection of its
-// own, sees one moment, and stops nobody.
+// What keeps the database in bounds, and what others than the server read of it.
 #pragma once
 
 #include <filesystem>
@@ -13,7 +12,8 @@
 
 namespace lightloom {
 
-/// The database of the state folder, to read: a server may work on it meanwhile. FailedPrecondition if the folder is no
+/// The database of the state folder, to read: a server may work on it meanwhile, and neither waits for the other.
+/// FailedPrecondition if the folder is no
 /// state folder, or one of another release.
 absl::StatusOr<std::unique_ptr<Database>> open_sqlite_reader(const std::filesystem::path& folder);
 

@@ -58,6 +58,24 @@ CellRecord make_record(const CellResult& c, const ChunkRef& chunk) {
   return record;
 }
 
+template <class T>
+uint64_t bytes_of(const std::vector<T>& v) {
+  return v.size() * sizeof(T);
+}
+
+/// Of what is big: the rest is small beside it, or short-lived.
+uint64_t bytes_of(const RayTracer& tracer, const Plan& plan) {
+  uint64_t bytes = tracer.bytes();
+  for (const Object& o : tracer.scene().objects) {
+    bytes += bytes_of(o.positions) + bytes_of(o.normals) + bytes_of(o.uv0) + bytes_of(o.uv1) + bytes_of(o.triangles);
+  }
+  for (const Texture& t : tracer.scene().textures) bytes += bytes_of(t.rgba);
+  for (const LightmapUv& uv : plan.layout.uv) bytes += bytes_of(uv.corners);
+  for (const TexelGrid& grid : plan.receivers.grids) bytes += bytes_of(grid.texels) + bytes_of(grid.fragments);
+  for (const PlannedCell& cell : plan.cells) bytes += bytes_of(cell.receivers);
+  return bytes + bytes_of(plan.receivers.all) + bytes_of(plan.placement.probes);
+}
+
 std::vector<Vec3> positions_of(const std::vector<Probe>& probes) {
   std::vector<Vec3> positions;
   positions.reserve(probes.size());
@@ -72,7 +90,8 @@ BakeSession::BakeSession(const RayTracer& tracer, Plan plan)
       plan_(std::move(plan)),
       plan_digest_(hash_plan(plan_, tracer.scene())),
       probes_(positions_of(plan_.placement.probes)),
-      search_(tracer.scene(), plan_.layout, plan_.receivers) {
+      search_(tracer.scene(), plan_.layout, plan_.receivers),
+      bytes_(bytes_of(tracer, plan_)) {
   if (plan_.params.method == BakeMethod::kSl17) return;
   cache_ = std::make_unique<VisibilityCache>(tracer, plan_.layout, plan_.receivers.grids, probes_);
 }
@@ -126,6 +145,8 @@ absl::StatusOr<std::vector<ChunkRef>> BakeSession::relight(size_t first, size_t 
   spent_.relight_seconds += watch.seconds();
   return refs;
 }
+
+uint64_t BakeSession::bytes() const { return bytes_ + (cache_ != nullptr ? cache_->bytes() : 0); }
 
 BakeSession::Spent BakeSession::spent() const {
   const std::lock_guard lock(mutex_);

@@ -38,6 +38,8 @@ class BakeSession {
 
   const Plan& plan() const { return plan_; }
   const Scene& scene() const { return tracer_.scene(); }
+  /// About what it keeps in memory, the scene too; grows with what it remembers between cells.
+  uint64_t bytes() const;
   /// Two sessions with equal digests give the same bytes for the same task.
   const Digest& plan_digest() const { return plan_digest_; }
 
@@ -74,6 +76,7 @@ class BakeSession {
   std::vector<Vec3> probes_;                // the plan's; the cache refers to them
   std::unique_ptr<VisibilityCache> cache_;  // none for SL17, as published
   ReceiverSearch search_;
+  const uint64_t bytes_;  // without what grows
   mutable std::mutex mutex_;
   mutable Spent spent_;  // guarded by mutex_
 };

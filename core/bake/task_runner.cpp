@@ -243,7 +243,7 @@ struct TaskRunner::Warm {
 
 SpawnedTask first_task() { return {"plan", 0, {}, 0}; }
 
-TaskRunner::TaskRunner(BlobAccess* blobs, size_t sessions) : blobs_(*blobs), sessions_(std::max<size_t>(sessions, 1)) {}
+TaskRunner::TaskRunner(BlobAccess* blobs, uint64_t cache_bytes) : blobs_(*blobs), cache_bytes_(cache_bytes) {}
 
 TaskRunner::~TaskRunner() = default;
 
@@ -256,6 +256,7 @@ absl::StatusOr<TaskOutput> TaskRunner::run(const BakeTask& task, const BakeContr
   const auto kind = std::find_if(kKinds.begin(), kKinds.end(), [&](const Kind& k) { return k.name == task.kind; });
   if (kind == kKinds.end()) return unknown_kind(task.kind);
   LL_ASSIGN_OR_RETURN(const auto session, session_of(task, control));
+  trim();
   LL_ASSIGN_OR_RETURN(const TaskArgument argument, argument_of(task, *session));
   return kind->run({*session, blobs_, task, argument, control});
 }
@@ -275,10 +276,6 @@ absl::StatusOr<std::shared_ptr<const BakeSession>> TaskRunner::session_of(const 
     made_.wait_for(lock, std::chrono::milliseconds(50));
     if (cancelled(control)) return absl::CancelledError("task '" + task.kind + "' cancelled");
   }
-  if (warm_.size() >= sessions_) {  // who still works with the one that goes keeps it alive
-    const auto last = std::find_if(warm_.rbegin(), warm_.rend(), [](const auto& w) { return w->session != nullptr; });
-    if (last != warm_.rend()) warm_.erase(last.base() - 1);
-  }
   const auto warm = std::make_shared<Warm>(Warm{payload, nullptr});
   warm_.insert(warm_.begin(), warm);
   lock.unlock();
@@ -296,6 +293,21 @@ absl::StatusOr<std::shared_ptr<const BakeSession>> TaskRunner::session_of(const 
   } catch (...) {
     settle(nullptr);
     throw;
+  }
+}
+
+/// Sessions grow while they are used, so each task looks anew.
+void TaskRunner::trim() {
+  std::vector<std::shared_ptr<Warm>> dropped;  // freed without the lock: that takes a while
+  const std::lock_guard lock(mutex_);
+  uint64_t bytes = 0;
+  for (const auto& w : warm_) bytes += w->session != nullptr ? w->session->bytes() : 0;
+  for (size_t i = warm_.size(); i-- > 1 && bytes > cache_bytes_;) {
+    const auto& session = warm_[i]->session;
+    if (session == nullptr || session.use_count() > 1) continue;
+    bytes -= session->bytes();
+    dropped.push_back(std::move(warm_[i]));
+    warm_.erase(warm_.begin() + static_cast<ptrdiff_t>(i));
   }
 }
 

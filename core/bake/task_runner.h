@@ -62,8 +62,9 @@ SpawnedTask first_task();
 /// Runs tasks. Thread-safe: tasks of one payload share a BakeSession, which the first of them makes while others wait.
 class TaskRunner {
  public:
-  /// Keeps the `sessions` that were used last, at least one. `blobs` must outlive the runner.
-  explicit TaskRunner(BlobAccess* blobs, size_t sessions = 2);
+  /// Keeps sessions warm within `cache_bytes` (BakeSession::bytes()): beyond it those that were used least recently go, but
+  /// never one in use, nor the last. `blobs` must outlive the runner.
+  explicit TaskRunner(BlobAccess* blobs, uint64_t cache_bytes = uint64_t{1} << 30);
   ~TaskRunner();
 
   /// A session that is at hand for tasks of this payload: they read no level blob then.
@@ -80,9 +81,10 @@ class TaskRunner {
 
   absl::StatusOr<std::shared_ptr<const BakeSession>> session_of(const BakeTask& task, const BakeControl& control);
   absl::StatusOr<std::shared_ptr<const BakeSession>> make_session(const BakeTask& task, const BakeControl& control);
+  void trim();
 
   BlobAccess& blobs_;
-  const size_t sessions_;
+  const uint64_t cache_bytes_;
   std::mutex mutex_;
   std::condition_variable made_;
   std::vector<std::shared_ptr<Warm>> warm_;  // used last first; guarded by mutex_, and what it points to

@@ -3,6 +3,7 @@
 #include <embree3/rtcore.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -92,6 +93,7 @@ void recompute(Vec3 o, Vec3 d, Vec3 p0, Vec3 p1, Vec3 p2, Hit* hit) {
 }  // namespace
 
 struct RayTracer::Impl {
+  std::atomic<int64_t> bytes{0};  // that Embree has, told by itself; before what still tells it while it goes
   const Scene* scene = nullptr;
   RTCDevice device = nullptr;
   RTCScene embree = nullptr;
@@ -117,6 +119,11 @@ absl::StatusOr<std::unique_ptr<RayTracer>> RayTracer::create(const Scene& scene)
   if (!impl->device) {
     return absl::InternalError("Embree cannot start (error " + std::to_string(rtcGetDeviceError(nullptr)) + ")");
   }
+  const auto count = [](void* bytes, ssize_t change, bool) {
+    *static_cast<std::atomic<int64_t>*>(bytes) += change;
+    return true;
+  };
+  rtcSetDeviceMemoryMonitorFunction(impl->device, count, &impl->bytes);
   impl->embree = rtcNewScene(impl->device);
   rtcSetSceneFlags(impl->embree, RTC_SCENE_FLAG_ROBUST);
   rtcSetSceneBuildQuality(impl->embree, RTC_BUILD_QUALITY_HIGH);
@@ -196,6 +203,8 @@ bool RayTracer::occluded(Vec3 origin, Vec3 direction, float t_max) const {
 bool RayTracer::visible(Vec3 from, Vec3 to) const { return !occluded(from, to - from, 1.0f); }
 
 const Scene& RayTracer::scene() const { return *impl_->scene; }
+
+uint64_t RayTracer::bytes() const { return static_cast<uint64_t>(std::max<int64_t>(impl_->bytes, 0)); }
 
 Vec3 RayTracer::position(const Hit& hit) const {
   const Object& object = impl_->scene->objects[hit.object];

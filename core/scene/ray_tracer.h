@@ -42,6 +42,8 @@ class RayTracer {
   bool visible(Vec3 from, Vec3 to) const;
 
   const Scene& scene() const;
+  /// That the acceleration structure takes, without the scene.
+  uint64_t bytes() const;
   /// World-space position, geometric unit normal (front side) of a hit.
   Vec3 position(const Hit& hit) const;
   Vec3 geometric_normal(const Hit& hit) const;

@@ -1,127 +1,21 @@
 // A whole farm in one process: real server, workers and client, over gRPC's in-process channel and over TCP, on a real
 // state folder. Whatever happens on the way, the asset has the bytes of a bake without a farm.
 #include <gmock/gmock.h>
-#include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
 
 #include <atomic>
 #include <thread>
 
-#include "bake-server/grpc/server.h"
-#include "bake-worker/worker.h"
-#include "cli/farm_client.h"
-#include "core/asset/asset.h"
-#include "core/base/file.h"
-#include "core/base/version.h"
-#include "core/scene/builtin.h"
-#include "core/scene/gltf.h"
-#include "proto/client.h"
-#include "proto/protocol_version.h"
-#include "tests/support/baked_level.h"
+#include "tests/cluster/farm_fixture.h"
 
 namespace lightloom {
 namespace {
 
 namespace fs = std::filesystem;
+using test::FarmTest;
+using test::RunningWorker;
 using test::value_or_die;
 using ::testing::HasSubstr;
-
-ServerInfo this_release() { return {std::string(kVersion), kProtocolVersion, std::string(kMethodVersion)}; }
-
-/// A worker with its thread.
-class RunningWorker {
- public:
-  RunningWorker(std::shared_ptr<grpc::Channel> channel, const std::string& name, uint32_t threads = 1)
-      : worker_(std::move(channel), {name, introduce_this_machine(threads), 1}),
-        thread_([this] { status_ = worker_.run(); }) {}
-  ~RunningWorker() {
-    worker_.stop();
-    if (thread_.joinable()) thread_.join();
-  }
-  /// Finishes what it has and leaves.
-  absl::Status drain() {
-    worker_.drain();
-    thread_.join();
-    return status_;
-  }
-  /// Until it ends by itself.
-  absl::Status wait() {
-    thread_.join();
-    return status_;
-  }
-
- private:
-  Worker worker_;
-  absl::Status status_;
-  std::thread thread_;
-};
-
-class FarmTest : public testing::Test {
- protected:
-  void SetUp() override {
-    params_.texels_per_metre = 3;
-    params_.rays = 64;
-    params_.relight_rays = 256;
-    params_.cell_receivers = 128;
-    scene_path_ = folder_.path() / "level.glb";
-    ASSERT_TRUE(save_gltf(value_or_die(builtin_scene("cornell")), scene_path_).ok());
-    scene_ = value_or_die(read_file(scene_path_));
-    start_server("127.0.0.1:0");
-  }
-  void start_server(const std::string& address) {
-    CoordinatorOptions options;
-    options.lease_ms = 5'000;
-    farm_ = value_or_die(Farm::open(folder_.path() / "state", options));
-    server_ = value_or_die(Server::start(address, this_release(), farm_.get()));
-  }
-  /// As if the power went: nothing is said to anyone but by closed connections.
-  void stop_server() {
-    server_.reset();
-    farm_.reset();
-  }
-  std::string address() const { return server_->address(); }
-
-  RemoteJob submit(int priority = 0) {
-    FarmClient client(address());
-    return value_or_die(client.submit(scene_, params_, "cornell", priority, [](uint64_t) {}));
-  }
-  RemoteJob watch(
-      uint64_t id, const std::function<void(const RemoteJob&)>& changed = [](const RemoteJob&) {}) {
-    FarmClient client(address());
-    const CancelFlag never;
-    return value_or_die(client.watch(id, never, changed));
-  }
-  /// What a bake without a farm has under each name.
-  std::map<std::string, std::vector<uint8_t>> files_of(const fs::path& loom) {
-    std::map<std::string, std::vector<uint8_t>> out;
-    for (const auto& file : fs::recursive_directory_iterator(loom)) {
-      if (file.is_regular_file()) out[fs::relative(file.path(), loom)] = value_or_die(read_file(file.path()));
-    }
-    return out;
-  }
-  void expect_fetched_as_baked(uint64_t job) {
-    FarmClient client(address());
-    const CancelFlag never;
-    const fs::path fetched = folder_.path() / ("fetched" + std::to_string(job));
-    value_or_die(client.fetch(job, fetched, never, [](uint64_t, uint64_t) {}));
-    if (baked_.empty()) {
-      const Scene scene = value_or_die(load_gltf(scene_path_));
-      const auto tracer = value_or_die(RayTracer::create(scene));
-      value_or_die(bake(*tracer, params_, folder_.path() / "baked", {}));
-      baked_ = files_of(folder_.path() / "baked");
-    }
-    EXPECT_EQ(files_of(fetched), baked_);
-    EXPECT_TRUE(verify_asset(fetched).ok());
-  }
-
-  test::TemporaryFolder folder_;
-  fs::path scene_path_;
-  std::vector<uint8_t> scene_;
-  BakeParams params_;
-  std::map<std::string, std::vector<uint8_t>> baked_;
-  std::unique_ptr<Farm> farm_;
-  std::unique_ptr<Server> server_;  // before the farm it works on
-};
 
 TEST_F(FarmTest, OneTwoAndFourWorkersGiveTheSameBytes) {
   for (const int workers : {1, 2, 4}) {
@@ -134,8 +28,35 @@ TEST_F(FarmTest, OneTwoAndFourWorkersGiveTheSameBytes) {
     const RemoteJob job = watch(submit().id);
     ASSERT_EQ(job.state, "done") << job.error;
     EXPECT_EQ(job.done, job.tasks);
+    EXPECT_EQ(job.reused, 0u);
     expect_fetched_as_baked(job.id);
+    // What is known would not be baked again.
+    running.clear();
+    stop_server();
+    fs::remove_all(folder_.path() / "state");
+    start_server("127.0.0.1:0");
   }
+}
+
+TEST_F(FarmTest, WhatAnEarlierJobBakedIsNotBakedAgain) {
+  RemoteJob first = submit();
+  FarmClient client(address());
+  {
+    const RunningWorker worker(dial(address()), "worker");
+    first = watch(first.id, [&](const RemoteJob& now) {
+      if (now.done >= 5) (void)client.cancel(first.id);
+    });
+    ASSERT_EQ(first.state, "cancelled");
+    const RemoteJob second = watch(submit().id);
+    ASSERT_EQ(second.state, "done") << second.error;
+    EXPECT_GE(second.reused, 5u);
+    EXPECT_LT(second.reused, second.tasks);
+    expect_fetched_as_baked(second.id);
+  }
+  const RemoteJob third = submit();
+  EXPECT_EQ(third.state, "done") << "at once, and without a worker";
+  EXPECT_EQ(third.reused, third.tasks);
+  expect_fetched_as_baked(third.id);
 }
 
 TEST_F(FarmTest, WorkersLeaveAndJoinOnTheWay) {
@@ -248,7 +169,8 @@ TEST_F(FarmTest, ErrorsSayWhatIsWrong) {
 TEST_F(FarmTest, AWorkerOfAnotherMethodIsTurnedAway) {
   Introduction other = introduce_this_machine(1);
   other.method_version = "none";
-  Worker worker(dial(address()), {"worker", other, 1});
+  LocalExecutor executor(dial(address()), 1, 0);
+  Worker worker(dial(address()), &executor, {"worker", other});
   EXPECT_EQ(worker.run().code(), absl::StatusCode::kFailedPrecondition);
 }
 

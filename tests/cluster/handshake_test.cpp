@@ -23,10 +23,16 @@ namespace {
 using testing::HasSubstr;
 
 constexpr std::chrono::seconds kPatience{30};  // never reached unless something hangs
-const ServerInfo kInfo{.version = "9.9.9", .protocol_version = 1, .method_version = "method-a"};
+const ServerInfo kInfo{
+    .version = "9.9.9", .protocol_version = 1, .method_version = "method-a", .canary = sha256("canary")};
 
 Introduction fitting_worker() {
-  return {.version = "9.9.8", .protocol_version = 1, .method_version = "method-a", .avx2 = true, .threads = 2};
+  return {.version = "9.9.8",
+          .protocol_version = 1,
+          .method_version = "method-a",
+          .avx2 = true,
+          .threads = 2,
+          .canary = sha256("canary")};
 }
 
 /// A folder for a farm, removed at the end.
@@ -93,6 +99,16 @@ TEST_P(Handshake, AWorkerWithoutAvx2IsRefused) {
   const auto joined = join(channel_, worker, kPatience);
   EXPECT_EQ(joined.status().code(), absl::StatusCode::kFailedPrecondition);
   EXPECT_THAT(std::string(joined.status().message()), HasSubstr("AVX2"));
+}
+
+TEST_P(Handshake, AWorkerThatBakesOtherBytesIsRefused) {
+  Introduction worker = fitting_worker();
+  worker.canary = sha256("other");
+  const auto joined = join(channel_, worker, kPatience);
+  EXPECT_EQ(joined.status().code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_THAT(std::string(joined.status().message()), HasSubstr("a tiny known bake has other bytes there"));
+  worker.canary.reset();
+  EXPECT_EQ(join(channel_, worker, kPatience).status().code(), absl::StatusCode::kFailedPrecondition);
 }
 
 TEST_P(Handshake, ManyWorkersAtOnceGetTheirOwnAnswers) {

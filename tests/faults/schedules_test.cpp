@@ -25,9 +25,8 @@ constexpr int64_t kGiveUpMs = 60'000;
 constexpr uint32_t kCells = 4;
 
 /// What a task yields: a pure function of it, as the store asks for.
-std::vector<Digest> outputs_of(const Assignment& a) {
-  return {sha256(absl::StrCat(a.payload, "/", a.kind, "/", a.argument))};
-}
+std::string output_of(const Assignment& a) { return absl::StrCat(a.payload, "/", a.kind, "/", a.argument); }
+std::vector<Digest> outputs_of(const Assignment& a) { return {sha256(output_of(a))}; }
 std::vector<NewTask> spawned_by(const Assignment& a) {
   if (a.kind != "plan") return {};
   std::vector<NewTask> out;
@@ -91,7 +90,7 @@ class Schedule {
       if (chance_.one_in(4)) agenda_.at(time_of_fault(), [this] { kill_coordinator(); });
     }
     tick();
-    while (!over() && agenda_.now() < kGiveUpMs) ASSERT_TRUE(agenda_.step());
+    while (!over_ && agenda_.now() < kGiveUpMs) ASSERT_TRUE(agenda_.step());
     check();
   }
 
@@ -165,6 +164,7 @@ class Schedule {
   /// The coordinator's loop.
   void tick() {
     hear({});
+    over_ = over();
     agenda_.at(agenda_.now() + 100, [this] { tick(); });
   }
   /// As Coordinator::loop(): what comes in is durable together with what follows from it, or not at all.
@@ -262,6 +262,8 @@ class Schedule {
     } else if (faults_now() && chance_.one_in(10)) {
       w->released.insert(attempt);
     } else {
+      const std::string output = output_of(task->second);
+      value(blobs_->put({reinterpret_cast<const uint8_t*>(output.data()), output.size()}));
       w->finished.insert(*task);
     }
     w->running.erase(task);
@@ -307,6 +309,7 @@ class Schedule {
   Faults* faults_;
   std::unique_ptr<Dispatcher> dispatcher_;  // null while it is dead
   uint64_t life_ = 0, next_token_ = 0;
+  bool over_ = false;
   std::vector<std::unique_ptr<Worker>> workers_;
   std::set<JobId> jobs_;
   std::map<std::string, std::set<JobId>> ids_;  // by request

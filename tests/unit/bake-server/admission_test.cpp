@@ -76,5 +76,21 @@ TEST(Admission, RefusesWithoutThreads) {
   EXPECT_EQ(admit(worker, kServer).refusal, Refusal::kNoThreads);
 }
 
+TEST(Admission, RefusesOtherBytesForAKnownBake) {
+  ServerInfo server = kServer;
+  WorkerInfo worker = fitting_worker();
+  server.canary = sha256("known");
+  EXPECT_EQ(admit(worker, server).refusal, Refusal::kCanary) << "it does not say";
+  worker.canary = sha256("other");
+  const Admission admission = admit(worker, server);
+  EXPECT_EQ(admission.refusal, Refusal::kCanary);
+  EXPECT_THAT(admission.message, HasSubstr(worker.canary->hex().substr(0, 12)));
+  worker.canary = server.canary;
+  EXPECT_TRUE(admit(worker, server).accepted());
+  server.canary.reset();
+  worker.canary = sha256("other");
+  EXPECT_TRUE(admit(worker, server).accepted()) << "a server that does not ask";
+}
+
 }  // namespace
 }  // namespace lightloom

@@ -1,13 +1,12 @@
 // Levels, assets and disks that are bad: `lightloom` says in one line what is wrong, where, and how to mend it, and writes
 // nothing under the final name.
-#include <sched.h>
-#include <sys/mount.h>
 #include <sys/resource.h>
 
 #include <csignal>
 #include <limits>
 
 #include "tests/support/program.h"
+#include "tests/support/small_disk.h"
 #include "tests/unit/scene/gltf_fixture.h"
 
 namespace lightloom {
@@ -123,29 +122,8 @@ TEST_F(BadInput, AFileTooLargeForTheDisksQuota) {
   expect_nothing(path("out.loom"));
 }
 
-/// A small file system mounted on a folder, for this process and its children.
-class SmallDisk {
- public:
-  explicit SmallDisk(std::string at) : at_(std::move(at)) {
-    fs::create_directory(at_);
-    mounted_ = ::unshare(::geteuid() == 0 ? CLONE_NEWNS : CLONE_NEWUSER | CLONE_NEWNS) == 0 &&
-               ::mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr) == 0 &&
-               ::mount("none", at_.c_str(), "tmpfs", 0, "size=128k") == 0;
-  }
-  ~SmallDisk() {
-    if (mounted_) ::umount(at_.c_str());
-  }
-  SmallDisk(const SmallDisk&) = delete;
-  SmallDisk& operator=(const SmallDisk&) = delete;
-  bool mounted() const { return mounted_; }
-
- private:
-  std::string at_;
-  bool mounted_ = false;
-};
-
 TEST_F(BadInput, AFullDisk) {
-  const SmallDisk disk(path("small"));
+  const test::SmallDisk disk(path("small"), "128k");
   if (!disk.mounted()) GTEST_SKIP() << "this user may not mount a small file system to fill";
   test::write(path("small/e.exr"), "old");
   const std::string line = fails(1, bake(scene_, path("small/out.loom")), "no space left");

@@ -161,6 +161,28 @@ TEST_F(TaskRunnerTest, SessionsThatDropOutComeBack) {
   EXPECT_EQ(blobs_.gets[scene_], 3) << "a, b and a again";
 }
 
+TEST_F(TaskRunnerTest, SessionsStayWarmWithinTheLimit) {
+  BakeParams other = small();
+  other.order = 1;
+  const BakeTask a = task(find(plan(), "cell")), b = task(find(plan(other), "cell"), other);
+  TaskRunner both(&blobs_, uint64_t{1} << 30);
+  blobs_.gets.clear();
+  for (const BakeTask& t : {a, b, a, b}) value_or_die(both.run(t));
+  EXPECT_EQ(blobs_.gets[scene_], 2);
+}
+
+TEST_F(TaskRunnerTest, SessionsKnowWhatTheyTake) {
+  const auto session = value_or_die(BakeSession::create(value_or_die(builtin_scene("cornell")), small(), {}));
+  const uint64_t before = session->bytes();
+  EXPECT_GT(before, session->plan().receivers.all.size() * sizeof(Receiver));
+  const ChunkSink sink = [&](std::span<const uint8_t> bytes) -> absl::StatusOr<ChunkRef> {
+    return ChunkRef{sha256(bytes), bytes.size()};
+  };
+  value_or_die(session->cell(0, sink));
+  EXPECT_GT(session->bytes(), before) << "it remembers what it saw";
+  EXPECT_LT(session->bytes(), uint64_t{1} << 30);
+}
+
 TEST_F(TaskRunnerTest, CancelStopsATaskAndOnlyThat) {
   CancelFlag cancel;
   BakeControl control;

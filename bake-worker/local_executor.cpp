@@ -1,0 +1,50 @@
+#include "bake-worker/local_executor.h"
+
+#include <chrono>
+
+#include "proto/client.h"
+
+namespace lightloom {
+namespace {
+
+/// For threads that hold a slot of the gate: others compute while a blob is on its way.
+class RemoteBlobs final : public BlobAccess {
+ public:
+  RemoteBlobs(std::shared_ptr<grpc::Channel> channel, ComputeGate* gate)
+      : client_(std::move(channel), patience()), gate_(gate) {}
+  absl::StatusOr<std::vector<uint8_t>> get(const Digest& digest) override {
+    const ComputeGate::Pause pause(gate_);
+    return client_.download(digest);
+  }
+  absl::StatusOr<Digest> put(std::span<const uint8_t> bytes) override {
+    const ComputeGate::Pause pause(gate_);
+    return client_.upload(bytes);
+  }
+
+ private:
+  /// A server that restarts, or has a full disk for a while, should not cost the work of minutes.
+  static Patience patience() {
+    Patience p;
+    p.total = std::chrono::minutes(10);
+    p.call = std::chrono::seconds(60);
+    p.wait_for_room = true;
+    return p;
+  }
+  BlobClient client_;
+  ComputeGate* gate_;
+};
+
+}  // namespace
+
+LocalExecutor::LocalExecutor(std::shared_ptr<grpc::Channel> channel, uint32_t threads, uint64_t cache_bytes)
+    : gate_(threads),
+      blobs_(std::make_unique<RemoteBlobs>(std::move(channel), &gate_)),
+      runner_(blobs_.get(), cache_bytes) {}
+
+absl::StatusOr<TaskOutput> LocalExecutor::run(const BakeTask& task, const BakeControl& control) {
+  const ComputeGate::Slot slot(&gate_);
+  if (control.cancel != nullptr && control.cancel->cancelled()) return absl::CancelledError("cancelled");
+  return runner_.run(task, control);
+}
+
+}  // namespace lightloom
