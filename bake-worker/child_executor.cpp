@@ -83,7 +83,9 @@ void ChildExecutor::send_what_may_run() {
   const bool doubt = any(&Call::suspect);
   for (const auto& [id, call] : calls_) {
     if (call->sent || call->result) continue;
-    if (doubt && (!call->suspect || any(&Call::sent))) continue;
+    call->beside = any(&Call::sent);
+    if (doubt && (!call->suspect || call->beside)) continue;
+    for (const auto& [other_id, other] : calls_) other->beside |= other->sent;
     call->sent = true;
     executor::Command command;
     command.mutable_run()->set_id(id);
@@ -96,7 +98,10 @@ void ChildExecutor::send_what_may_run() {
 void ChildExecutor::keep() {
   std::unique_lock lock(mutex_);
   for (;;) {
-    changed_.wait(lock, [&] { return ending_ || (!calls_.empty() && health_.ok()); });
+    changed_.wait(lock, [&] {
+      return ending_ || (health_.ok() && std::any_of(calls_.begin(), calls_.end(),
+                                                     [](const auto& call) { return !call.second->result; }));
+    });
     if (ending_) return;
     lock.unlock();
     auto started = ChildProcess::start(options_.command);
@@ -147,20 +152,21 @@ bool ChildExecutor::converse(Frames* frames) {
     if (report.has_finished()) {
       const executor::Report::Finished& finished = report.finished();
       failures_ = 0;
-      const auto at = calls_.find(finished.id());
-      if (at != calls_.end()) {
-        Call* const call = at->second;
-        call->sent = call->suspect = false;
-        if (finished.code() == 0) {
-          call->result = to_output(finished.output());
-        } else {
-          call->result = absl::Status(static_cast<absl::StatusCode>(finished.code()), finished.message());
-        }
+      if (const auto at = calls_.find(finished.id()); at != calls_.end()) {
+        const auto code = static_cast<absl::StatusCode>(finished.code());
+        finish(at->second,
+               code == absl::StatusCode::kOk ? to_output(finished.output()) : absl::Status(code, finished.message()));
       }
     }
     send_what_may_run();
     changed_.notify_all();
   }
+}
+
+void ChildExecutor::finish(Call* call, absl::StatusOr<TaskOutput> output) {
+  call->sent = false;
+  call->suspect = is_out_of_memory(output.status()) && call->beside && !call->cancelling;
+  if (!call->suspect) call->result = std::move(output);
 }
 
 void ChildExecutor::settle(const ChildEnd& end) {
@@ -192,7 +198,9 @@ void ChildExecutor::count_failure(const std::string& what) {
     health_ = absl::UnavailableError(what + ", " + std::to_string(kMostFailures) +
                                      " times in a row and without a task; look whether this machine has the memory "
                                      "and the libraries that lightloom-worker needs");
-    for (const auto& [id, call] : calls_) call->result = health_;
+    for (const auto& [id, call] : calls_) {
+      if (!call->result) call->result = health_;
+    }
   }
   changed_.notify_all();
 }

@@ -28,7 +28,8 @@ struct ChildOptions {
 /// One child runs all tasks. It is started when a task wants it, and again after it ended.
 ///
 /// A child that ends while a single task runs ends by its fault: the task fails. While several ran, nobody knows whose fault
-/// it was: each is run again, alone, before anything else; only one that ends the child alone fails.
+/// it was: each is run again, alone, before anything else; only one that ends the child alone fails. So is a task that found
+/// no memory beside others.
 class ChildExecutor final : public TaskExecutor {
  public:
   explicit ChildExecutor(ChildOptions options);
@@ -47,12 +48,14 @@ class ChildExecutor final : public TaskExecutor {
     const BakeTask& task;
     const BakeControl& control;
     bool sent = false, cancelling = false;
-    bool suspect = false;  // ran when a child ended
+    bool beside = false;   // others ran meanwhile
+    bool suspect = false;  // ran when a child ended, or found no memory beside others: to be run alone
     std::optional<absl::StatusOr<TaskOutput>> result = std::nullopt;
   };
 
   void keep();
   bool converse(Frames* frames);
+  void finish(Call* call, absl::StatusOr<TaskOutput> output);
   void settle(const ChildEnd& end);
   void count_failure(const std::string& what);
   void send_what_may_run();

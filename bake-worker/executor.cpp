@@ -1,17 +1,29 @@
 #include "bake-worker/executor.h"
 
 #include <new>
+#include <string>
+#include <string_view>
 
 #include "core/base/text.h"
 
 namespace lightloom {
+namespace {
+
+constexpr std::string_view kOutOfMemory = "out of memory in task";
+
+}  // namespace
 
 absl::StatusOr<TaskOutput> run_within_memory(TaskExecutor* executor, const BakeTask& task,
                                              const BakeControl& control) try {
   return executor->run(task, control);
 } catch (const std::bad_alloc&) {
-  return absl::ResourceExhaustedError("out of memory in task '" + printable(task.kind, 64) +
+  return absl::ResourceExhaustedError(std::string(kOutOfMemory) + " '" + printable(task.kind, 64) +
                                       "'; give the worker more memory, or fewer --threads");
+}
+
+bool is_out_of_memory(const absl::Status& status) {
+  // Other resources run out, too: disks, on the server.
+  return absl::IsResourceExhausted(status) && std::string(status.message()).starts_with(kOutOfMemory);
 }
 
 }  // namespace lightloom

@@ -18,5 +18,7 @@ class TaskExecutor {
 
 /// executor.run(); running out of memory fails the task, not the process: ResourceExhausted.
 absl::StatusOr<TaskOutput> run_within_memory(TaskExecutor* executor, const BakeTask& task, const BakeControl& control);
+/// Whether it is that error.
+bool is_out_of_memory(const absl::Status& status);
 
 }  // namespace lightloom

@@ -7,6 +7,9 @@
 namespace lightloom {
 namespace {
 
+/// Of the task that the calling thread runs; means nothing between tasks.
+thread_local const CancelFlag* cancel_of_task = nullptr;
+
 /// For threads that hold a slot of the gate: others compute while a blob is on its way.
 class RemoteBlobs final : public BlobAccess {
  public:
@@ -28,6 +31,7 @@ class RemoteBlobs final : public BlobAccess {
     p.total = std::chrono::minutes(10);
     p.call = std::chrono::seconds(60);
     p.wait_for_room = true;
+    p.give_up = [] { return cancel_of_task != nullptr && cancel_of_task->cancelled(); };
     return p;
   }
   BlobClient client_;
@@ -44,7 +48,11 @@ LocalExecutor::LocalExecutor(std::shared_ptr<grpc::Channel> channel, uint32_t th
 absl::StatusOr<TaskOutput> LocalExecutor::run(const BakeTask& task, const BakeControl& control) {
   const ComputeGate::Slot slot(&gate_);
   if (control.cancel != nullptr && control.cancel->cancelled()) return absl::CancelledError("cancelled");
-  return runner_.run(task, control);
+  cancel_of_task = control.cancel;
+  auto output = runner_.run(task, control);
+  if (!output.ok() && control.cancel != nullptr && control.cancel->cancelled())
+    return absl::CancelledError("cancelled");
+  return output;
 }
 
 }  // namespace lightloom

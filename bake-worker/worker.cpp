@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <limits>
 #include <random>
 
 #include "bake-worker/task_messages.h"
@@ -54,10 +55,13 @@ void Worker::drain() {
 void Worker::drain_locked() {
   draining_ = true;
   for (const auto& [place, attempt] : queue_) {
+    if (!running_.at(attempt)->lost) released_.push_back(attempt);
     running_.erase(attempt);
-    released_.push_back(attempt);
   }
   queue_.clear();
+  for (auto& [attempt, running] : running_) {
+    if (running->lost) running->cancel.cancel();
+  }
   tell();
 }
 
@@ -201,6 +205,15 @@ absl::Status Worker::sync_once() {
     std::erase(released_, attempt);
   }
   for (const std::string& attempt : response.lost()) lose(attempt);
+  for (const std::string& payload : response.warm()) {
+    // Nobody waits for it; what the server gives out goes before it.
+    auto running = std::make_shared<Running>();
+    running->task = {"warm", {payload.begin(), payload.end()}, {}, {}};
+    running->lost = true;
+    const std::string name = "warm " + std::to_string(++arrivals_);
+    running_.emplace(name, std::move(running));
+    queue_.emplace(std::pair(std::numeric_limits<int64_t>::max(), arrivals_), name);
+  }
   for (const auto& a : response.assignments()) {
     if (running_.contains(a.attempt()) || finished_.contains(a.attempt())) continue;  // it came twice
     auto running = std::make_shared<Running>();

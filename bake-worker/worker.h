@@ -51,7 +51,7 @@ class Worker {
     BakeTask task;
     std::atomic<uint64_t> rays{0};
     CancelFlag cancel;
-    bool lost = false;  // nobody waits for it any more
+    bool lost = false;  // nobody waits for it, or not any more
   };
 
   void execute();

@@ -160,33 +160,27 @@ absl::Status BlobStore::append(const Digest& digest, uint64_t size, uint64_t off
   const auto mine = turn(digest);
   const std::lock_guard lock(*mine);
   if (has(digest)) return absl::OkStatus();
-  if (const absl::Status room = check_room_ ? check_room_() : absl::OkStatus(); !room.ok()) {
+  const fs::path part = layout_.part(digest);
+  // What came of an upload that is refused would fill the disk, and leave no room for anything else.
+  const auto drop = [&](absl::Status status) {
     std::error_code ignored;
-    fs::remove(layout_.part(digest), ignored);  // or it would fill the disk and wait for others to make room
-    return room;
-  }
-  if (uploaded(digest) > size) {  // somebody else gave another size
-    std::error_code ignored;
-    fs::remove(layout_.part(digest), ignored);
-  }
+    fs::remove(part, ignored);
+    return status;
+  };
+  if (absl::Status room = check_room_ ? check_room_() : absl::OkStatus(); !room.ok()) return drop(std::move(room));
+  if (uploaded(digest) > size) (void)drop(absl::OkStatus());  // somebody else gave another size
   if (uploaded(digest) != offset) {
     return absl::AbortedError("the upload of blob " + digest.hex() + " is at byte " + std::to_string(uploaded(digest)) +
                               "; go on there");
   }
-  if (const absl::Status written = write_at(layout_.part(digest), offset, data); !written.ok()) {
-    std::error_code ignored;
-    fs::remove(layout_.part(digest), ignored);  // on a full disk it would leave no room for anything else
-    return written;
-  }
+  if (absl::Status written = write_at(part, offset, data); !written.ok()) return drop(std::move(written));
   if (offset + data.size() < size) return absl::OkStatus();
 
-  LL_ASSIGN_OR_RETURN(const Digest found, digest_of(layout_.part(digest)));
+  LL_ASSIGN_OR_RETURN(const Digest found, digest_of(part));
   if (found != digest) {
-    std::error_code ignored;
-    fs::remove(layout_.part(digest), ignored);
-    return absl::DataLossError("blob " + digest.hex() + " arrived with other bytes; send it again");
+    return drop(absl::DataLossError("blob " + digest.hex() + " arrived with other bytes; send it again"));
   }
-  const absl::Status made = commit(layout_.part(digest), digest);
+  absl::Status made = commit(part, digest);
   if (!absl::IsNotFound(made)) return made;
   return absl::AbortedError("blob " + digest.hex() + " was long in coming and is no longer waited for; send it again");
 }

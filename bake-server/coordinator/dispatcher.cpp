@@ -163,9 +163,15 @@ absl::Status Dispatcher::give_out(int64_t now_ms) {
   }
   if (demands.empty() || (options_.paused && options_.paused())) return absl::OkStatus();
   LL_ASSIGN_OR_RETURN(std::vector<JobView> view, store_->view(kReadyPerJob));
-  std::erase_if(inputs_, [&](const auto& list) {
-    return std::none_of(view.begin(), view.end(), [&](const JobView& job) { return job.id == list.first.first; });
-  });
+  const auto runs = [&](JobId id) {
+    return std::any_of(view.begin(), view.end(), [&](const JobView& job) { return job.id == id; });
+  };
+  std::erase_if(inputs_, [&](const auto& list) { return !runs(list.first.first); });
+  for (auto& [id, worker] : workers_) std::erase_if(worker.warmed, [&](JobId job) { return !runs(job); });
+  std::vector<JobId> waiting;  // jobs of which nothing is left to give out now
+  for (const JobView& job : view) {
+    if (job.ready.empty() && job.live > 0) waiting.push_back(job.id);
+  }
   for (const Decision& d : decide(std::move(view), std::move(demands), now_ms, options_.decide)) {
     const NewLease lease{d.task, d.worker, options_.new_token(), now_ms + options_.lease_ms, kMaxLive};
     LL_ASSIGN_OR_RETURN(const bool leased, store_->lease(lease, now_ms));
@@ -180,6 +186,25 @@ absl::Status Dispatcher::give_out(int64_t now_ms) {
     to->answer.assignments.push_back(std::move(assigned));
     if (to->room > 0) --to->room;
     to->urgent = true;
+  }
+  return warm_up(waiting);
+}
+
+/// A job's first task asks for all others, and takes as long as it takes to plan the level: those that have nothing to do
+/// meanwhile plan it too, as each of them has to.
+absl::Status Dispatcher::warm_up(const std::vector<JobId>& jobs) {
+  for (Pending& p : pending_) {
+    Worker& worker = workers_[p.worker];
+    if (p.room == 0 || worker.draining || !worker.held.empty()) continue;
+    for (const JobId id : jobs) {
+      if (worker.warmed.contains(id)) continue;
+      LL_ASSIGN_OR_RETURN(const Job job, store_->job(id));
+      worker.warmed.insert(id);
+      if (job.done > 0) continue;
+      p.answer.warm.push_back(job.payload);
+      p.urgent = true;
+      break;  // one level at a time
+    }
   }
   return absl::OkStatus();
 }

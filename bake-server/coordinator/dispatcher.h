@@ -6,6 +6,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -55,6 +56,7 @@ struct SyncAnswer {
   uint64_t sequence = 0;
   std::vector<std::string> acknowledged, lost;
   std::vector<Assignment> assignments;
+  std::vector<std::string> warm;  ///< payloads whose tasks are on their way
   uint32_t lease_ms = 0;
 };
 
@@ -118,6 +120,7 @@ class Dispatcher {
     bool draining = false;
     int64_t heard_ms = 0;
     std::map<std::string, Held> held;  // by attempt
+    std::set<JobId> warmed;            // that it was told of before it got their tasks
     JobId last_job = 0;
     int64_t last_order = 0;
   };
@@ -133,6 +136,7 @@ class Dispatcher {
   absl::Status record(const SyncMessage& message, Worker* worker, SyncAnswer* answer, int64_t now_ms);
   absl::Status resend(const std::vector<std::string>& attempts, Worker* worker, Pending* pending, int64_t now_ms);
   absl::Status give_out(int64_t now_ms);
+  absl::Status warm_up(const std::vector<JobId>& jobs);
   absl::StatusOr<Assignment> assignment(TaskId task, const std::string& attempt);
   absl::StatusOr<std::optional<Digest>> inputs_of(const Task& task);
   std::vector<Answered> take_due(int64_t now_ms);

@@ -83,6 +83,7 @@ void to_proto(const SyncAnswer& answer, v1::SyncResponse* out) {
   out->set_lease_ms(answer.lease_ms);
   for (const std::string& a : answer.acknowledged) out->add_acknowledged(a);
   for (const std::string& a : answer.lost) out->add_lost(a);
+  for (const std::string& payload : answer.warm) out->add_warm(payload);
   for (const Assignment& a : answer.assignments) {
     auto* to = out->add_assignments();
     to->set_attempt(a.attempt);

@@ -40,7 +40,7 @@ absl::Status check_target(const fs::path& to) {
 absl::Status sync_file_system(const fs::path& path) {
   const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
   if (fd < 0) return failed("open", path, std::strerror(errno));
-  const absl::Status status = ::syncfs(fd) == 0 ? absl::OkStatus() : failed("sync", path, std::strerror(errno));
+  absl::Status status = ::syncfs(fd) == 0 ? absl::OkStatus() : failed("sync", path, std::strerror(errno));
   ::close(fd);
   return status;
 }

@@ -82,6 +82,9 @@ absl::StatusOr<TaskOutput> run_plan(const Context& c) {
   return out;
 }
 
+/// The session is there: that was all.
+absl::StatusOr<TaskOutput> run_warm(const Context&) { return TaskOutput(); }
+
 absl::StatusOr<TaskOutput> run_cell(const Context& c) {
   LL_ASSIGN_OR_RETURN(const BakedCell cell, c.session.cell(c.argument.first, c.sink(), c.control.cancel));
   TaskOutput out;
@@ -207,11 +210,12 @@ struct Kind {
   std::string_view name;
   absl::StatusOr<TaskOutput> (*run)(const Context&);
 };
-constexpr std::array<Kind, 5> kKinds{{{"plan", run_plan},
+constexpr std::array<Kind, 6> kKinds{{{"plan", run_plan},
                                       {"cell", run_cell},
                                       {"relight", run_relight},
                                       {"surfaces", run_surfaces},
-                                      {"assemble", run_assemble}}};
+                                      {"assemble", run_assemble},
+                                      {"warm", run_warm}}};
 
 absl::Status unknown_kind(std::string_view kind) {
   std::string known;
@@ -221,9 +225,9 @@ absl::Status unknown_kind(std::string_view kind) {
 
 /// Of the task, checked against the worker's own plan: were they to differ, so would the outputs.
 absl::StatusOr<TaskArgument> argument_of(const BakeTask& task, const BakeSession& session) {
-  if (task.kind == "plan") {
+  if (task.kind == "plan" || task.kind == "warm") {
     if (task.argument.empty()) return TaskArgument{};
-    return absl::InvalidArgumentError("task 'plan' has an argument; submit it without one");
+    return absl::InvalidArgumentError("task '" + task.kind + "' has an argument; submit it without one");
   }
   LL_ASSIGN_OR_RETURN(const TaskArgument argument, decode_argument(task.argument));
   if (argument.plan != session.plan_digest()) {

@@ -6,6 +6,7 @@
 //   relight     1    probes            chunk refs       one per probe
 //   surfaces    1    all objects       chunk refs       one per object that has receivers
 //   assemble    2    -                 the manifest     -
+//   warm        -    empty             -                -              nobody asks for it: makes the session
 #pragma once
 
 #include <condition_variable>

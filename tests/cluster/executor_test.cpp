@@ -121,8 +121,11 @@ TEST_F(ChildTest, OutOfMemoryFailsTheTaskNotTheChild) {
   const auto hog = run(&executor, "hog");
   EXPECT_EQ(hog.status().code(), absl::StatusCode::kResourceExhausted);
   EXPECT_THAT(std::string(hog.status().message()), HasSubstr("out of memory in task 'hog'"));
-  EXPECT_TRUE(run(&executor, "fine").ok());
+  auto first = begin(&executor, "hog 2", path("met")), second = begin(&executor, "hog 2", path("met"));
+  EXPECT_EQ(first.get()->rays, 7u) << "alone there is memory";
+  EXPECT_EQ(second.get()->rays, 7u);
   EXPECT_EQ(executor.child(), child);
+  EXPECT_THAT(ends_.said(), IsEmpty());
 }
 
 TEST_F(ChildTest, AnExecutorThatCannotWorkIsGivenUp) {

@@ -4,8 +4,8 @@
 //   crash       SIGSEGV
 //   exit        exit code 3
 //   hog         allocates without end
-//   meet N, crash N   (argument: the name of a file) the first time, wait until N of them run in this process; then each
-//               does as its name says, a "meet" like "hold"; alone, "meet" is "fine"
+//   meet N, crash N, hog N   (argument: the name of a file) the first time, wait until N of them run in this process; then
+//               each does as its name says, a "meet" like "hold". Once they have met "meet" and "hog" are "fine"
 // With arguments "KIND": as a real executor, but tasks of that kind end it by SIGSEGV.
 #include <signal.h>
 #include <stdio.h>
@@ -38,14 +38,15 @@ class Faults final : public TaskExecutor {
   absl::StatusOr<TaskOutput> run(const BakeTask& task, const BakeControl& control) override {
     const std::string kind = task.kind.substr(0, task.kind.find(' '));
     if (kind == "exit") ::_exit(3);
-    if (kind == "hog") return hog();
     if (kind == "hold") return hold(control);
     const size_t number = task.kind.find(' ');
+    if (kind == "hog" && number == std::string::npos) return hog();
     const std::filesystem::path met(std::string(task.argument.begin(), task.argument.end()));
     if (number != std::string::npos && !std::filesystem::exists(met)) {
       meet(std::stoi(task.kind.substr(number)));
       if (kind == "meet") return hold(control);
       std::ofstream(met) << "met";
+      if (kind == "hog") return hog();
     }
     if (kind == "crash") crash();
     TaskOutput out;
