@@ -23,9 +23,11 @@ constexpr double kAheadSeconds = 0.25;
 /// More than threads: some wait for the network.
 uint32_t begun_at_once(uint32_t threads) { return threads + 1 + threads / 8; }
 
-/// The server will not hear of this worker, however often it asks.
-bool is_final(const absl::Status& status) {
-  return absl::IsFailedPrecondition(status) || absl::IsInvalidArgument(status) || absl::IsUnimplemented(status);
+/// The server will not hear of this worker, however often it asks. `known`: it has heard of it before.
+bool is_final(const absl::Status& status, bool known) {
+  // A server that is stopping answers as if it had no such call.
+  return absl::IsFailedPrecondition(status) || absl::IsInvalidArgument(status) ||
+         (absl::IsUnimplemented(status) && !known);
 }
 
 }  // namespace
@@ -125,7 +127,7 @@ void Worker::run_task(const std::string& attempt, Running* running) {
 absl::Status Worker::run() {
   for (;;) {
     const absl::Status status = sync_once();
-    if (is_final(status)) return status;
+    if (is_final(status, synced_ != Clock::time_point())) return status;
     std::unique_lock lock(mutex_);
     if (draining_ && running_.empty() && !has_news()) return health_;
     if (stopping_ && !status.ok()) return health_;  // nobody hears what is handed back: its lease ends
