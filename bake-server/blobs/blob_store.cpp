@@ -217,9 +217,12 @@ absl::StatusOr<Digest> BlobStore::put(std::span<const uint8_t> bytes) {
   const Digest digest = sha256(bytes);
   if (has(digest)) return digest;
   const fs::path temporary = temporary_beside(layout_.part(digest));
-  LL_RETURN_IF_ERROR(write_at(temporary, 0, bytes));
-  LL_RETURN_IF_ERROR(commit(temporary, digest));
-  return digest;
+  absl::Status status = write_at(temporary, 0, bytes);
+  if (status.ok()) status = commit(temporary, digest);
+  if (status.ok()) return digest;
+  std::error_code ignored;
+  fs::remove(temporary, ignored);
+  return status;
 }
 
 }  // namespace lightloom

@@ -10,6 +10,8 @@
 namespace lightloom {
 namespace {
 
+constexpr int64_t kTellEveryMs = 50;  // watchers
+
 absl::Status stopping() { return absl::UnavailableError("the server is stopping; try again when it is back"); }
 
 }  // namespace
@@ -110,7 +112,12 @@ void Coordinator::loop() {
   auto watches = std::exchange(watches_, {});
   lock.unlock();
   for (auto& [message, to] : inbox) to(stopping());
-  for (auto& a : dispatcher_.give_up(stopping())) a.to(std::move(a.answer));
+  std::vector<Dispatcher::Answered> answers;
+  {
+    const std::lock_guard dispatching(dispatching_);  // calls that read it may still come in
+    answers = dispatcher_.give_up(stopping());
+  }
+  for (auto& a : answers) a.to(std::move(a.answer));
   for (Watch& w : watches) w.changed(stopping());
 }
 
@@ -126,6 +133,9 @@ JobStatus Coordinator::status_of(Job job) {
 
 /// Keeps those that want to hear more.
 void Coordinator::tell(std::vector<Watch>* watches) {
+  if (clock_() - told_ms_ < kTellEveryMs) return;
+  told_ms_ = clock_();
+  std::erase_if(*watches, [](const Watch& w) { return w.over(); });
   for (Watch& w : *watches) {
     auto job = store_->job(w.job);
     if (!job.ok()) {
@@ -186,11 +196,11 @@ std::vector<WorkerStatus> Coordinator::workers() {
   return dispatcher_.workers(clock_());
 }
 
-void Coordinator::watch(JobId job, uint64_t after_revision, OnChange changed) {
+void Coordinator::watch(JobId job, uint64_t after_revision, OnChange changed, std::function<bool()> over) {
   {
     const std::lock_guard lock(mutex_);
     if (!stop_) {
-      watches_.push_back({job, after_revision, 0, std::move(changed)});
+      watches_.push_back({job, after_revision, 0, std::move(changed), std::move(over)});
       work_ = true;
       wake_.notify_all();
       return;

@@ -57,15 +57,16 @@ class Coordinator {
   std::vector<WorkerStatus> workers();
 
   /// Calls back with the job whenever it changed, from another thread; an error ends it. `changed` returns false to be
-  /// called no more.
+  /// called no more; `over` says that nobody listens any more. Both may be called after the watcher has gone.
   using OnChange = std::function<bool(const absl::StatusOr<JobStatus>&)>;
-  void watch(JobId job, uint64_t after_revision, OnChange changed);
+  void watch(JobId job, uint64_t after_revision, OnChange changed, std::function<bool()> over);
 
  private:
   struct Watch {
     JobId job = 0;
     uint64_t revision = 0, rays = 0;
     OnChange changed;
+    std::function<bool()> over;
   };
 
   void loop();
@@ -87,6 +88,7 @@ class Coordinator {
   bool stop_ = false, work_ = false, news_ = false;
   std::vector<std::pair<SyncMessage, OnAnswer>> inbox_;
   std::vector<Watch> watches_;
+  int64_t told_ms_ = 0;  // the loop's
   std::thread thread_;
 };
 

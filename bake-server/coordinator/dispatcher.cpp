@@ -37,6 +37,12 @@ std::string random_token() {
 void Dispatcher::hear(SyncMessage message, OnAnswer to, int64_t now_ms) {
   Worker& worker = workers_[message.worker];
   const SyncOutcome outcome = worker.session.sync(facts_of(message));
+  if (outcome.replaced) {
+    // If its sender still lives, two of one name would take each other's tasks away without end.
+    answered_.push_back({std::move(to), absl::FailedPreconditionError("another process works here under the name '" +
+                                                                      message.worker + "'; give each its own --name")});
+    return;
+  }
   if (outcome.stale) {
     answered_.push_back({std::move(to), absl::AbortedError("a newer Sync of worker " + message.worker + " is here")});
     return;
@@ -139,7 +145,13 @@ void Dispatcher::forget(const std::string& attempt, Worker* worker) {
 }
 
 std::vector<Dispatcher::Answered> Dispatcher::step(int64_t now_ms) {
-  absl::Status status = store_->expire(now_ms).status();
+  const auto expired = store_->expire(now_ms);
+  if (expired.ok()) {
+    for (const std::string& attempt : *expired) {
+      for (auto& [id, worker] : workers_) worker.held.erase(attempt);
+    }
+  }
+  absl::Status status = expired.status();
   if (status.ok()) status = give_out(now_ms);
   if (!status.ok()) return give_up(status);
 
@@ -172,15 +184,20 @@ absl::Status Dispatcher::give_out(int64_t now_ms) {
   for (const JobView& job : view) {
     if (job.ready.empty() && job.live > 0) waiting.push_back(job.id);
   }
-  for (const Decision& d : decide(std::move(view), std::move(demands), now_ms, options_.decide)) {
+  std::vector<std::string> present;
+  for (const auto& [id, worker] : workers_) {
+    if (!worker.draining && now_ms - worker.heard_ms <= options_.lease_ms) present.push_back(id);
+  }
+  for (const Decision& d : decide(std::move(view), std::move(demands), now_ms, options_.decide, present)) {
     const NewLease lease{d.task, d.worker, options_.new_token(), now_ms + options_.lease_ms, kMaxLive};
+    // First, so that nothing is leased that cannot be told.
+    LL_ASSIGN_OR_RETURN(Assignment assigned, assignment(d.task, lease.token));
     LL_ASSIGN_OR_RETURN(const bool leased, store_->lease(lease, now_ms));
     if (!leased) continue;  // somebody else was faster: look again with the next step
     Worker& worker = workers_[d.worker];
     worker.last_job = d.job;
     worker.last_order = d.order;
     worker.held[lease.token] = {d.job, d.task, 0};
-    LL_ASSIGN_OR_RETURN(Assignment assigned, assignment(d.task, lease.token));
     const auto to =
         std::find_if(pending_.begin(), pending_.end(), [&](const Pending& p) { return p.worker == d.worker; });
     to->answer.assignments.push_back(std::move(assigned));

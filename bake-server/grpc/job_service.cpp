@@ -104,7 +104,8 @@ class Watching final : public grpc::ServerWriteReactor<v1::Job> {
     if (!ok) return shared_->end(grpc::Status::CANCELLED);
     // The coordinator may call back after the call has ended, so what both touch lives as long as either.
     coordinator_->watch(job_, after_,
-                        [shared = shared_](const absl::StatusOr<JobStatus>& job) { return shared->changed(job); });
+                        [shared = shared_](const absl::StatusOr<JobStatus>& job) { return shared->changed(job); },
+                        [shared = shared_] { return shared->over(); });
   }
   void OnWriteDone(bool ok) override {
     const auto lock = hand_over_.hold();
@@ -141,6 +142,10 @@ class Watching final : public grpc::ServerWriteReactor<v1::Job> {
       }
       go_on();
       return !ending;
+    }
+    bool over() {
+      const std::lock_guard lock(mutex);
+      return reactor == nullptr || ending;
     }
     void written(bool ok) {
       const std::lock_guard lock(mutex);

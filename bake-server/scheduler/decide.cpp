@@ -11,8 +11,8 @@ namespace {
 
 class Deciding {
  public:
-  Deciding(std::vector<JobView> jobs, int64_t now_ms, const DecideOptions& options)
-      : jobs_(std::move(jobs)), now_ms_(now_ms), options_(options) {
+  Deciding(std::vector<JobView> jobs, std::set<std::string> workers, int64_t now_ms, const DecideOptions& options)
+      : jobs_(std::move(jobs)), workers_(std::move(workers)), now_ms_(now_ms), options_(options) {
     for (const JobView& job : jobs_) {
       priority_[job.id] = job.priority;
       out_of_client_[job.client] += job.live;
@@ -48,7 +48,7 @@ class Deciding {
       return std::tuple(-static_cast<int64_t>(job.priority), out_of_client_[job.client], out_of_job_[job.id], job.id);
     };
     for (JobView& job : jobs_) {
-      if (!job.ready.empty() && (best == nullptr || rank(job) < rank(*best))) best = &job;
+      if ((best == nullptr || rank(job) < rank(*best)) && has_one_for(job, demand.worker)) best = &job;
     }
     if (best == nullptr || (demand.room == 0 && !is_urgent(*best, demand))) return std::nullopt;
 
@@ -57,6 +57,16 @@ class Deciding {
     best->ready.erase(chosen);
     best->running.push_back({task.task, task.order, 1, now_ms_, {demand.worker}});
     return give(best, task.task, task.order, demand.worker);
+  }
+
+  bool may_have(const JobView::Ready& task, const std::string& worker) const {
+    const auto failed = [&](const std::string& w) {
+      return std::find(task.failed_by.begin(), task.failed_by.end(), w) != task.failed_by.end();
+    };
+    return !failed(worker) || std::all_of(workers_.begin(), workers_.end(), failed);
+  }
+  bool has_one_for(const JobView& job, const std::string& worker) const {
+    return std::any_of(job.ready.begin(), job.ready.end(), [&](const auto& t) { return may_have(t, worker); });
   }
 
   bool is_urgent(const JobView& job, const Demand& demand) const {
@@ -70,7 +80,10 @@ class Deciding {
 
   std::vector<JobView::Ready>::const_iterator choose(const JobView& job, const Demand& demand) {
     const auto& runs = runs_[job.id];
-    const auto first_that = [&](const auto& fits) { return std::find_if(job.ready.begin(), job.ready.end(), fits); };
+    const auto first_that = [&](const auto& fits) {
+      return std::find_if(job.ready.begin(), job.ready.end(),
+                          [&](const JobView::Ready& t) { return fits(t) && may_have(t, demand.worker); });
+    };
     if (demand.last_job == job.id) {
       const auto own =
           first_that([&](const JobView::Ready& t) { return run_of(t.order) == run_of(demand.last_order); });
@@ -80,7 +93,7 @@ class Deciding {
       const auto at = runs.lower_bound({run_of(t.order), std::string()});
       return at == runs.end() || at->first != run_of(t.order);
     });
-    return free != job.ready.end() ? free : job.ready.begin();
+    return free != job.ready.end() ? free : first_that([](const JobView::Ready&) { return true; });
   }
 
   std::optional<Decision> straggler(const Demand& demand) {
@@ -101,6 +114,7 @@ class Deciding {
   }
 
   std::vector<JobView> jobs_;
+  std::set<std::string> workers_;
   int64_t now_ms_;
   DecideOptions options_;
   std::map<JobId, int32_t> priority_;
@@ -112,8 +126,10 @@ class Deciding {
 }  // namespace
 
 std::vector<Decision> decide(std::vector<JobView> jobs, std::vector<Demand> demands, int64_t now_ms,
-                             const DecideOptions& options) {
-  Deciding deciding(std::move(jobs), now_ms, options);
+                             const DecideOptions& options, const std::vector<std::string>& others) {
+  std::set<std::string> workers(others.begin(), others.end());
+  for (const Demand& demand : demands) workers.insert(demand.worker);
+  Deciding deciding(std::move(jobs), std::move(workers), now_ms, options);
   std::vector<Decision> out;
   // In turns, so that a worker with many threads does not take all.
   for (bool gave = true; gave;) {

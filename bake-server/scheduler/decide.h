@@ -38,7 +38,9 @@ struct Decision {
 /// first. Stragglers when there is nothing else. At most two leases a task. A worker without room, which has tasks queued
 /// behind those it runs, gets one of higher priority all the same while it has fewer such than threads: it starts it
 /// with the next thread that is free.
+/// Who failed a task gets it no more while there is a worker that did not. `others`: workers that are there, but do not
+/// ask now.
 std::vector<Decision> decide(std::vector<JobView> jobs, std::vector<Demand> demands, int64_t now_ms,
-                             const DecideOptions& options = {});
+                             const DecideOptions& options = {}, const std::vector<std::string>& others = {});
 
 }  // namespace lightloom

@@ -9,6 +9,7 @@ SyncOutcome WorkerSession::sync(const SyncFacts& facts) {
   const bool restarted = incarnation_ != 0 && facts.incarnation != incarnation_;
   if (ended_.contains(facts.incarnation) || (!restarted && facts.sequence <= sequence_)) {
     out.stale = true;
+    out.replaced = ended_.contains(facts.incarnation);
     return out;
   }
   if (restarted) {

@@ -20,6 +20,7 @@ struct SyncFacts {
 /// What follows from it.
 struct SyncOutcome {
   bool stale = false;               ///< an old message that arrived late: say nothing, do nothing
+  bool replaced = false;            ///< stale, and from a process that another one of that name has followed
   std::vector<std::string> gone;    ///< attempts that the worker cannot have any more: hand them back
   std::vector<std::string> resend;  ///< assignments whose answer may have been lost
 };

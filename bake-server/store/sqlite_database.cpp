@@ -19,6 +19,7 @@ struct PreparedStatement {
 struct Database::Impl {
   std::filesystem::path file;
   sqlite3* connection = nullptr;
+  bool transaction = false;                                  // one has begun, whether or not SQLite still has it
   std::map<std::string_view, PreparedStatement> statements;  // by their SQL; std::map keeps addresses
 };
 
@@ -174,25 +175,37 @@ absl::Status Database::error(int code) const {
 }
 
 absl::Status Transaction::begin() {
-  // SQLite knows whether one is open: some errors end it.
-  const bool inner = sqlite3_get_autocommit(database_.impl_->connection) == 0;
+  Database::Impl& impl = *database_.impl_;
+  const bool inner = impl.transaction;
+  // Some errors end a transaction: what comes after them must not be committed by itself.
+  if (inner && sqlite3_get_autocommit(impl.connection) != 0) {
+    return absl::AbortedError(impl.file.string() + ": an earlier error has undone this change; try again");
+  }
   // IMMEDIATE: what the transaction reads must not change before it writes.
   LL_RETURN_IF_ERROR(database_.run(inner ? "SAVEPOINT inner" : "BEGIN IMMEDIATE").status());
   state_ = inner ? State::kInner : State::kOuter;
+  impl.transaction = true;
   return absl::OkStatus();
 }
 
 absl::Status Transaction::commit() {
+  Database::Impl& impl = *database_.impl_;
+  if (sqlite3_get_autocommit(impl.connection) != 0) {
+    return absl::AbortedError(impl.file.string() + ": an earlier error has undone this change; try again");
+  }
   LL_RETURN_IF_ERROR(database_.run(state_ == State::kInner ? "RELEASE inner" : "COMMIT").status());
+  if (state_ == State::kOuter) impl.transaction = false;
   state_ = State::kClosed;
   return absl::OkStatus();
 }
 
 Transaction::~Transaction() {
-  sqlite3* const connection = database_.impl_->connection;
-  if (state_ == State::kClosed || sqlite3_get_autocommit(connection) != 0) return;
-  sqlite3_exec(connection, state_ == State::kInner ? "ROLLBACK TO inner; RELEASE inner" : "ROLLBACK", nullptr, nullptr,
-               nullptr);
+  if (state_ == State::kClosed) return;
+  Database::Impl& impl = *database_.impl_;
+  if (state_ == State::kOuter) impl.transaction = false;
+  if (sqlite3_get_autocommit(impl.connection) != 0) return;
+  sqlite3_exec(impl.connection, state_ == State::kInner ? "ROLLBACK TO inner; RELEASE inner" : "ROLLBACK", nullptr,
+               nullptr, nullptr);
 }
 
 }  // namespace lightloom

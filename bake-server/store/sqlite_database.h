@@ -100,7 +100,7 @@ class Transaction {
 
  private:
   Database& database_;
-  enum class State { kClosed, kOuter, kInner } state_ = State::kClosed;
+  enum class State { kClosed, kOuter, kInner } state_ = State::kClosed;  // kClosed: never begun, or committed
 };
 
 }  // namespace lightloom

@@ -124,6 +124,8 @@ struct Counts {
 
 class SqliteStore final : public Store {
  public:
+  explicit SqliteStore(std::function<bool(const std::vector<Digest>&)> there) : there_(std::move(there)) {}
+
   absl::Status open(const fs::path& folder, Durability durability) {
     LL_RETURN_IF_ERROR(lock_.take(folder));
     const fs::path file = folder / "store.db";
@@ -560,18 +562,26 @@ class SqliteStore final : public Store {
   absl::Status reuse(JobId job, int64_t now_ms) {
     std::vector<std::pair<TaskId, TaskId>> known;  // a task, and its twin that is done
     {
-      // One twin each: they have equal outputs, or else an event said so.
+      // One twin each: results are pure functions of the key.
       Query query = db_->query(
-          "SELECT t.id, (SELECT d.id FROM tasks d INDEXED BY tasks_results WHERE d.key = t.key AND d.state = 1 LIMIT 1)"
-          " AS twin FROM tasks t INDEXED BY tasks_idle JOIN progress p ON p.job = t.job"
+          "SELECT t.id, (SELECT d.id FROM tasks d INDEXED BY tasks_results WHERE d.key = t.key AND d.state = 1"
+          " AND NOT EXISTS (SELECT 1 FROM attempts a INDEXED BY attempts_by_task WHERE a.task = d.id AND a.state = ?2)"
+          " LIMIT 1) AS twin FROM tasks t INDEXED BY tasks_idle JOIN progress p ON p.job = t.job"
           " WHERE t.job = ?1 AND t.stage = p.open_stage AND t.state = 0 AND t.live = 0 AND t.key != x''"
           " AND twin NOT NULL",
-          job);
+          job, number(AttemptState::kMismatched));
       for (;;) {
         LL_ASSIGN_OR_RETURN(const bool row, query.step());
         if (!row) break;
         known.emplace_back(query.integer(0), query.integer(1));
       }
+    }
+    if (there_) {
+      for (auto& [task, twin] : known) {
+        LL_ASSIGN_OR_RETURN(const TaskRow of, find_task(twin));
+        if (!there_(unpack(of.outputs))) twin = 0;
+      }
+      std::erase_if(known, [](const auto& pair) { return pair.second == 0; });
     }
     for (const auto& [task, twin] : known) {
       LL_RETURN_IF_ERROR(db_->run("UPDATE tasks SET state = 1, outputs = (SELECT outputs FROM tasks WHERE id = ?2)"
@@ -694,13 +704,32 @@ class SqliteStore final : public Store {
   absl::Status view_ready(int64_t open_stage, uint32_t limit, JobView& view) {
     // INDEXED BY: without that index the statement does not compile, so it cannot silently become a scan.
     Query query = db_->query(
-        "SELECT id, ord FROM tasks INDEXED BY tasks_idle WHERE job = ?1 AND stage = ?2 AND state = 0 AND live = 0"
+        "SELECT id, ord, failures FROM tasks INDEXED BY tasks_idle WHERE job = ?1 AND stage = ?2 AND state = 0 AND "
+        "live = 0"
         " ORDER BY ord, id LIMIT ?3",
         view.id, open_stage, limit);
     for (;;) {
       LL_ASSIGN_OR_RETURN(const bool row, query.step());
       if (!row) return absl::OkStatus();
-      view.ready.push_back({.task = query.integer(0), .order = query.integer(1)});
+      JobView::Ready& task = view.ready.emplace_back();
+      task.task = query.integer(0);
+      task.order = query.integer(1);
+      if (query.integer(2) > 0) {
+        LL_ASSIGN_OR_RETURN(task.failed_by, who_failed(task.task));
+      }
+    }
+  }
+
+  absl::StatusOr<std::vector<std::string>> who_failed(TaskId task) {
+    std::vector<std::string> workers;
+    Query query = db_->query(
+        "SELECT DISTINCT worker FROM attempts INDEXED BY attempts_by_task WHERE task = ?1 AND state = ?2"
+        " ORDER BY worker",
+        task, number(AttemptState::kFailed));
+    for (;;) {
+      LL_ASSIGN_OR_RETURN(const bool row, query.step());
+      if (!row) return workers;
+      workers.push_back(query.bytes(0));
     }
   }
 
@@ -770,15 +799,17 @@ class SqliteStore final : public Store {
     }
   }
 
-  FolderLock lock_;               // declared first: let go after the database is closed
+  const std::function<bool(const std::vector<Digest>&)> there_;
+  FolderLock lock_;               // before the database: let go after the database is closed
   std::recursive_mutex mutex_;    // a group's calls hold it once more
   std::unique_ptr<Database> db_;  // guarded by mutex_
 };
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<Store>> open_sqlite_store(const fs::path& folder, Durability durability) {
-  auto store = std::make_unique<SqliteStore>();
+absl::StatusOr<std::unique_ptr<Store>> open_sqlite_store(const fs::path& folder, Durability durability,
+                                                         std::function<bool(const std::vector<Digest>&)> there) {
+  auto store = std::make_unique<SqliteStore>(std::move(there));
   LL_RETURN_IF_ERROR(store->open(folder, durability));
   return store;
 }

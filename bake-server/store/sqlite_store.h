@@ -2,7 +2,9 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <memory>
+#include <vector>
 
 #include "bake-server/store/store.h"
 #include "core/base/file.h"
@@ -12,8 +14,10 @@ namespace lightloom {
 
 /// Opens FOLDER/store.db, or begins it: the folder and those above it are made. FOLDER/lock is held while the store
 /// lives, so that a second server refuses to start (FailedPrecondition). FailedPrecondition, too, for a newer schema or
-/// somebody else's database, DataLoss for a damaged one.
-absl::StatusOr<std::unique_ptr<Store>> open_sqlite_store(const std::filesystem::path& folder,
-                                                         Durability durability = Durability::kPowerLoss);
+/// somebody else's database, DataLoss for a damaged one. `there`: whether these outputs still are, so that they can be
+/// used again; null: always.
+absl::StatusOr<std::unique_ptr<Store>> open_sqlite_store(
+    const std::filesystem::path& folder, Durability durability = Durability::kPowerLoss,
+    std::function<bool(const std::vector<Digest>& outputs)> there = nullptr);
 
 }  // namespace lightloom

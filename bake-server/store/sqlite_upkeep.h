@@ -13,8 +13,7 @@
 namespace lightloom {
 
 /// The database of the state folder, to read: a server may work on it meanwhile, and neither waits for the other.
-/// FailedPrecondition if the folder is no
-/// state folder, or one of another release.
+/// FailedPrecondition if the folder is no state folder, or one of another release.
 absl::StatusOr<std::unique_ptr<Database>> open_sqlite_reader(const std::filesystem::path& folder);
 
 // What Store says of them:

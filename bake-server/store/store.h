@@ -135,6 +135,7 @@ struct JobView {
   struct Ready {
     TaskId task = 0;
     int64_t order = 0;
+    std::vector<std::string> failed_by = {};  ///< workers that failed it, each once, by name
     bool operator==(const Ready&) const = default;
   };
   struct Running {
@@ -181,7 +182,8 @@ class Store {
   /// The job as it is now. The same request again (client, request_id) returns the job that is there; AlreadyExists if
   /// it asked for something else. InvalidArgument beyond the limits above.
   /// Tasks of a stage that opens, here or later, that an earlier job of any client has done are done at once, with what
-  /// they spawned: equal are kind, stage and argument, of jobs with equal payload, inputs and tasks.
+  /// they spawned: equal are kind, stage and argument, of jobs with equal payload, inputs and tasks. Not those that
+  /// raised the alarm (kMismatch), nor those whose outputs are no longer there.
   virtual absl::StatusOr<Job> submit(const NewJob& job, int64_t now_ms) = 0;
   /// Idempotent; an ended job stays as it ended. All its attempts end. NotFound if there is no such job.
   virtual absl::Status cancel(JobId job, int64_t now_ms) = 0;

@@ -54,6 +54,20 @@ TEST(Decide, AnUrgentJobComesFirst) {
   EXPECT_EQ(decisions[10].job, 1);
 }
 
+TEST(Decide, WhoFailedATaskGetsItNoMoreWhileOthersAreThere) {
+  JobView view = job(1, 2);
+  view.ready[0].failed_by = {"v"};
+  EXPECT_THAT(orders(decide({view}, {{"v", 2}}, 0, {}, {"v", "w"}), "v"), ElementsAre(1));
+  EXPECT_THAT(orders(decide({view}, {{"v", 1}, {"w", 1}}, 0), "w"), ElementsAre(0));
+  EXPECT_THAT(orders(decide({view}, {{"v", 2}}, 0, {}, {"v"}), "v"), ElementsAre(0, 1)) << "there is nobody else";
+  view.ready[0].failed_by = {"v", "w"};
+  EXPECT_THAT(orders(decide({view}, {{"v", 2}}, 0, {}, {"v", "w"}), "v"), ElementsAre(0, 1)) << "all have";
+  // A job with nothing for this worker is no reason to leave it idle.
+  view.ready = {{7, 0, {"v"}}};
+  view.priority = 9;
+  EXPECT_EQ(decide({view, job(2, 1)}, {{"v", 1}}, 0, {}, {"w"}).front().job, 2);
+}
+
 TEST(Decide, AnUrgentTaskOvertakesWhatIsQueued) {
   // Two threads, four tasks of job 1; two more urgent ones start next, a third one would have to wait for those.
   const Demand full{.worker = "w", .room = 0, .threads = 2, .held = {1, 1, 1, 1}};

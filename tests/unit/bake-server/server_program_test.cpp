@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "bake-server/store/sqlite_store.h"
 #include "bake-server/upkeep/upkeep_lock.h"
 #include "tests/support/process.h"
 #include "tests/support/program.h"
@@ -78,6 +79,23 @@ TEST_F(ServerProgramTest, ABackupReplacesNothing) {
   EXPECT_EQ(test::text_of(path("copy/mine")), "x");
 }
 
+TEST_F(ServerProgramTest, ABackupWithoutABlobIsThereAndSaysSo) {
+  serve("state")->stop(SIGTERM);
+  fails(1, {"backup", "--state", path("state"), "--to", path("state/copy")}, "lies in the state folder");
+  const std::string gone(64, 'a');
+  {
+    const auto store = open_sqlite_store(path("state"), Durability::kProcess);
+    ASSERT_TRUE(store.ok()) << store.status();
+    NewJob job;
+    job.request_id = "1";
+    job.inputs.emplace_back().bytes.fill(0xaa);
+    job.tasks.emplace_back().kind = "plan";
+    ASSERT_TRUE((*store)->submit(job, 1).ok());
+  }
+  fails(1, {"backup", "--state", path("state"), "--to", path("copy")}, gone);
+  EXPECT_EQ(serve("copy")->stop(SIGTERM), 0);
+}
+
 TEST_F(ServerProgramTest, OneGcAtATime) {
   serve("state")->stop(SIGTERM);
   const auto lock = UpkeepLock::take(path("state"));
@@ -93,12 +111,12 @@ TEST_F(ServerProgramTest, ACommandLineThatCannotBeRead) {
       {{"--state", "x", "--retain", "1w"}, "'1w' is no time"},
       {{"--state", "x", "--min-free", "much"}, "'much' is no size"},
       {{"--state", "x", "--quota", "-1"}, "'-1' is no size"},
-      {{"gc", "--state", "x", "--grace", "soon"}, "'soon' is no time"}};
-  for (const auto& [arguments, what] : bad) {
-    const Result r = run(arguments);
-    EXPECT_EQ(r.code, 2) << what;
-    EXPECT_THAT(r.err, HasSubstr(what));
-  }
+      {{"gc", "--state", "x", "--grace", "soon"}, "'soon' is no time"},
+      {{"--stat", "x"}, "see lightloom-server --help"},
+      {{"gc", "--state", "x", "--force"}, "see lightloom-server gc --help"},
+      {{"--state", "x", "gc", "--state", "y"}, "--state before gc"},
+      {{"--insecure", "backup", "--state", "x", "--to", "y"}, "--insecure before backup"}};
+  for (const auto& [arguments, what] : bad) fails(2, arguments, what);
   EXPECT_FALSE(fs::exists(path("x")));
 }
 

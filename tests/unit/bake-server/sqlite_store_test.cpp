@@ -96,6 +96,20 @@ TEST_F(SqliteStoreTest, ANewerSchemaIsRefused) {
   EXPECT_TRUE(open_sqlite_store(folder_.path()).ok());
 }
 
+TEST_F(SqliteStoreTest, OutputsThatAreGoneAreNotUsedAgain) {
+  bool there = true;
+  const auto store = value(open_sqlite_store(folder_.path(), Durability::kProcess, [&](const auto& outputs) {
+    EXPECT_EQ(outputs, std::vector{digest(1)});
+    return there;
+  }));
+  value(store->submit(new_job("r", {cell(0, 0)}), 1));
+  EXPECT_TRUE(value(store->lease({1, "w", "a", 100, 1}, 10)));
+  EXPECT_EQ(value(store->complete("a", {digest(1)}, {}, 20)), Completion::kAccepted);
+  EXPECT_EQ(value(store->submit(new_job("s", {cell(0, 0)}), 30)).state, JobState::kDone);
+  there = false;
+  EXPECT_EQ(value(store->submit(new_job("t", {cell(0, 0)}), 40)).state, JobState::kRunning);
+}
+
 /// What version 1 had: version 2 without what it added.
 TEST_F(SqliteStoreTest, TheSchemaBeforeIsBroughtUp) {
   auto store = value(open_sqlite_store(folder_.path()));

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <map>
 #include <random>
+#include <set>
 
 #include "bake-server/store/store.h"
 #include "tests/unit/bake-server/store_fixture.h"
@@ -33,6 +34,7 @@ struct ModelAttempt {
   int64_t expires_ms = 0;
   bool live = true;
   bool mismatched = false;
+  bool failed = false;
 };
 
 struct ModelJob {
@@ -88,7 +90,13 @@ class StoreModel : public testing::TestWithParam<StoreBackend> {
     for (const auto& [order, t] : in_order) {
       if (state(t) != TaskState::kReady) continue;
       if (live(t) == 0) {
-        view.ready.push_back({tasks_[t].id, order});
+        JobView::Ready ready{tasks_[t].id, order};
+        std::set<std::string> failed_by;
+        for (const auto& [token, attempt] : attempts_) {
+          if (attempt.task == t && attempt.failed) failed_by.insert(attempt.worker);
+        }
+        ready.failed_by.assign(failed_by.begin(), failed_by.end());
+        view.ready.push_back(ready);
         continue;
       }
       JobView::Running running{.task = tasks_[t].id, .order = order, .leased_ms = INT64_MAX, .workers = {}};
@@ -255,6 +263,7 @@ class StoreModel : public testing::TestWithParam<StoreBackend> {
     EXPECT_EQ(value(store_->fail(name, "broke", now_, kMaxFailures)), expected);
     if (!expected) return;
     named->second.live = false;
+    named->second.failed = true;
     ModelTask& task = tasks_[named->second.task];
     note(named->second.task, named->second.worker, "failed: broke");
     if (++task.failures < kMaxFailures) return;

@@ -687,6 +687,25 @@ TEST_P(StoreContract, AFailedTaskIsTriedAgainByTheNextJob) {
   EXPECT_THAT(counts(job(submit(new_job("s", {cell(0, 0)})))), ElementsAre(1, 1, 0, 0, 0));
 }
 
+TEST_P(StoreContract, AResultThatRaisedTheAlarmIsNotTakenForKnown) {
+  const JobId first = submit(new_job("r", {cell(0, 0)}));
+  lease(task_of(first, 0), "v", "a", 2);
+  lease(task_of(first, 0), "w", "b", 2);
+  complete("a", 1);
+  EXPECT_EQ(complete("b", 2), Completion::kMismatch);
+  EXPECT_EQ(job(submit(new_job("s", {cell(0, 0)}))).done, 0u);
+}
+
+TEST_P(StoreContract, TheViewSaysWhoFailedATask) {
+  const JobId id = submit(new_job("r", {cell(0, 0), cell(0, 1)}));
+  for (const char* worker : {"w", "v", "w"}) {
+    lease(task_of(id, 1), worker, absl::StrCat(worker, job(id).revision));
+    fail(absl::StrCat(worker, job(id).revision - 1), "broke", 9);
+  }
+  EXPECT_THAT(value(store_->view(9)).at(0).ready,
+              ElementsAre(JobView::Ready{task_of(id, 0), 0}, JobView::Ready{task_of(id, 1), 1, {"v", "w"}}));
+}
+
 TEST_P(StoreContract, AGroupIsOneStep) {
   const JobId id = submit(new_job("r", {cell(0, 0), cell(0, 1)}));
   value(store_->group([&] {

@@ -290,13 +290,52 @@ TEST_F(BackupTest, AnEmptyFolderWillDoAndNothingElse) {
   expect_no_draft(folder_.path(), 4);
 }
 
+TEST_F(BackupTest, WhatIsMissingIsToldAndAllElseIsThere) {
+  done("a", 10, "level", "result");
+  done("b", 20, "another level", "another result");
+  const BlobLayout layout(state() / "blobs");
+  fs::remove(layout.blob(sha256("level")));
+  Backup backup = value(back_up(state(), folder_.path() / "copy"));
+  EXPECT_EQ(backup.blobs, 3u);
+  EXPECT_EQ(backup.missing, 1u);
+  EXPECT_EQ(backup.first_missing, sha256("level"));
+  expect_line(
+      check_whole(backup, "copy"), absl::StatusCode::kDataLoss,
+      "the backup copy has all else, but a blob that a job names is missing or damaged: " + sha256("level").hex());
+  const auto copy = value(BlobStore::open(folder_.path() / "copy" / "blobs"));
+  for (const char* there : {"result", "another level", "another result"}) EXPECT_TRUE(copy->has(sha256(there)));
+  fs::remove(layout.blob(sha256("result")));
+  backup = value(back_up(state(), folder_.path() / "second"));
+  EXPECT_EQ(backup.missing, 2u);
+  expect_line(check_whole(backup, "second"), absl::StatusCode::kDataLoss, "2 blobs");
+}
+
+TEST_F(BackupTest, ADamagedBlobIsNotCopied) {
+  const SmallDisk disk(folder_.path() / "disk", "8m");
+  if (!disk.mounted()) GTEST_SKIP() << "this user may not mount another file system";
+  done("a", 10, "level", "result");
+  std::ofstream(BlobLayout(state() / "blobs").blob(sha256("result"))) << "lesurt";
+  const Backup backup = value(back_up(state(), folder_.path() / "disk" / "copy"));
+  EXPECT_EQ(backup.blobs, 1u);
+  EXPECT_EQ(backup.missing, 1u);
+  EXPECT_EQ(backup.first_missing, sha256("result"));
+}
+
+TEST_F(BackupTest, NoneLiesInWhatItCopies) {
+  done("a", 10, "level", "result");
+  fs::create_directory_symlink(state(), folder_.path() / "link");
+  for (const fs::path& to : {state() / "copy", state() / "a" / ".." / "copy", folder_.path() / "link" / "copy/"}) {
+    expect_line(back_up(state(), to).status(), absl::StatusCode::kFailedPrecondition, "lies in the state folder");
+  }
+  EXPECT_FALSE(fs::exists(state() / "copy"));
+  EXPECT_TRUE(back_up(state(), folder_.path() / "state-copy").ok()) << "beside it is not in it";
+}
+
 TEST_F(BackupTest, WhatIsCutLeavesNothing) {
   done("a", 10, "level", "result");
   CancelFlag cancel;
   cancel.cancel();
   EXPECT_TRUE(absl::IsCancelled(back_up(state(), folder_.path() / "copy", &cancel).status()));
-  fs::remove(BlobLayout(state() / "blobs").blob(sha256("result")));
-  expect_line(back_up(state(), folder_.path() / "copy").status(), absl::StatusCode::kDataLoss, sha256("result").hex());
   expect_line(back_up(folder_.path(), folder_.path() / "copy").status(), absl::StatusCode::kFailedPrecondition,
               "no state folder");
   expect_no_draft(folder_.path(), 1);

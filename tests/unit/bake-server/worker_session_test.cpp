@@ -42,7 +42,9 @@ TEST(WorkerSession, AWorkerThatRestartedHasNothing) {
   session.sync({1, 7, 0, {}});
   session.assigned("x", session.answer());
   EXPECT_THAT(session.sync({2, 1, 0, {}}).gone, ElementsAre("x"));
+  EXPECT_FALSE(session.sync({2, 1, 0, {}}).replaced) << "a repetition";
   EXPECT_TRUE(session.sync({1, 8, 1, {"x"}}).stale) << "the dead process's last words";
+  EXPECT_TRUE(session.sync({1, 9, 1, {"x"}}).replaced) << "or it is not dead";
   EXPECT_FALSE(session.sync({2, 2, 0, {}}).stale);
 }
 
