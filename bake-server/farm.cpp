@@ -8,13 +8,13 @@ namespace lightloom {
 absl::StatusOr<std::unique_ptr<Farm>> Farm::open(const std::filesystem::path& folder, const CoordinatorOptions& options,
                                                  Durability durability, const FarmLimits& limits) {
   auto farm = std::make_unique<Farm>();
+  // First: a folder of another server must stay as it is.
+  LL_ASSIGN_OR_RETURN(farm->store_, open_sqlite_store(folder, durability, [self = farm.get()](const auto& outputs) {
+                        return self->blobs_->require(outputs).ok();
+                      }));
   farm->space_ = std::make_unique<FreeSpace>(folder, limits.min_free, limits.measure);
   LL_ASSIGN_OR_RETURN(farm->blobs_, BlobStore::open(folder / "blobs", durability,
                                                     [space = farm->space_.get()] { return space->check(); }));
-  LL_ASSIGN_OR_RETURN(farm->store_,
-                      open_sqlite_store(folder, durability, [blobs = farm->blobs_.get()](const auto& outputs) {
-                        return blobs->require(outputs).ok();
-                      }));
   CoordinatorOptions bounded = options;
   if (limits.min_free > 0) {
     bounded.dispatch.paused = [space = farm->space_.get()] { return !space->check().ok(); };

@@ -4,10 +4,12 @@
 
 #include <CLI/CLI.hpp>
 #include <csignal>
+#include <cstdio>
 #include <string>
 
 #include "bake-server/commands/commands.h"
 #include "core/base/parse_size.h"
+#include "core/base/text.h"
 #include "core/base/version.h"
 
 namespace {
@@ -26,6 +28,29 @@ void add_quantity(CLI::App* app, const std::string& name, T* value, absl::Status
     return true;
   };
   app->add_option(name, read, help)->default_str(preset);
+}
+
+/// Which command is meant; a server's options say nothing to the others.
+void check_command(const CLI::App& app, const lightloom::ServeOptions& serving) {
+  if (app.get_subcommands().empty()) {
+    if (serving.state.empty()) throw CLI::RequiredError("--state");
+    return;
+  }
+  const std::string command = app.get_subcommands().front()->get_name();
+  for (const CLI::Option* option : app.get_options()) {
+    if (option->count() == 0) continue;
+    throw CLI::ValidationError(option->get_name() + " before " + command,
+                               "it is for serving: give the options of " + command + " after it");
+  }
+}
+
+/// What CLI11 says, as one line.
+int usage_error(const CLI::App& app, const CLI::ParseError& error) {
+  const auto commands = app.get_subcommands();
+  const std::string command = commands.empty() ? "" : commands.front()->get_name() + " ";
+  std::fprintf(stderr, "lightloom-server: %s; see lightloom-server %s--help\n",
+               lightloom::escape_controls(error.what()).c_str(), command.c_str());
+  return 2;
 }
 
 }  // namespace
@@ -61,9 +86,9 @@ int main(int argc, char** argv) {
       ->required();
   try {
     app.parse(argc, argv);
-    if (app.get_subcommands().empty() && serving.state.empty()) throw CLI::RequiredError("--state");
+    check_command(app, serving);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
+    return error.get_exit_code() == 0 ? app.exit(error) : usage_error(app, error);
   }
 
   spdlog::set_default_logger(spdlog::stderr_color_mt("lightloom-server"));

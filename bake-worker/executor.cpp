@@ -13,12 +13,16 @@ constexpr std::string_view kOutOfMemory = "out of memory in task";
 
 }  // namespace
 
+absl::Status out_of_memory(const std::string& kind) {
+  return absl::ResourceExhaustedError(std::string(kOutOfMemory) + " '" + printable(kind, 64) +
+                                      "'; give the worker more memory, or fewer --threads");
+}
+
 absl::StatusOr<TaskOutput> run_within_memory(TaskExecutor* executor, const BakeTask& task,
                                              const BakeControl& control) try {
   return executor->run(task, control);
 } catch (const std::bad_alloc&) {
-  return absl::ResourceExhaustedError(std::string(kOutOfMemory) + " '" + printable(task.kind, 64) +
-                                      "'; give the worker more memory, or fewer --threads");
+  return out_of_memory(task.kind);
 }
 
 bool is_out_of_memory(const absl::Status& status) {

@@ -1,6 +1,8 @@
 // Where a worker's tasks run.
 #pragma once
 
+#include <string>
+
 #include "core/bake/task_runner.h"
 
 namespace lightloom {
@@ -16,7 +18,9 @@ class TaskExecutor {
   virtual absl::Status health() { return absl::OkStatus(); }
 };
 
-/// executor.run(); running out of memory fails the task, not the process: ResourceExhausted.
+/// That a task of this kind found no memory, or no room for a thread: ResourceExhausted.
+absl::Status out_of_memory(const std::string& kind);
+/// executor.run(); running out of memory fails the task, not the process: out_of_memory().
 absl::StatusOr<TaskOutput> run_within_memory(TaskExecutor* executor, const BakeTask& task, const BakeControl& control);
 /// Whether it is that error.
 bool is_out_of_memory(const absl::Status& status);

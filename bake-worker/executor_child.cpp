@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <map>
 #include <mutex>
+#include <new>
 #include <optional>
 #include <system_error>
 #include <thread>
@@ -37,18 +38,17 @@ class Tasks {
  public:
   Tasks(Frames* frames, TaskExecutor* executor) : frames_(frames), executor_(executor) {}
 
-  void begin(const executor::Command::Run& run) {
+  void begin(const executor::Command::Run& run) try {
     const auto cancel = std::make_shared<CancelFlag>();
     {
       const std::lock_guard lock(mutex_);
       cancels_[run.id()] = cancel;
     }
-    try {
-      std::thread([this, run, cancel] { finish(run.id(), execute(run, cancel.get())); }).detach();
-    } catch (const std::system_error&) {
-      finish(run.id(), absl::ResourceExhaustedError("no thread for task '" + run.task().kind() +
-                                                    "'; give the worker more memory, or fewer --threads"));
-    }
+    std::thread([this, run, cancel] { finish(run.id(), execute(run, cancel.get())); }).detach();
+  } catch (const std::system_error&) {  // no thread, as there is no room for its stack
+    finish(run.id(), out_of_memory(run.task().kind()));
+  } catch (const std::bad_alloc&) {
+    finish(run.id(), out_of_memory(run.task().kind()));
   }
   void cancel(uint64_t id) {
     const std::lock_guard lock(mutex_);
@@ -56,7 +56,7 @@ class Tasks {
   }
 
  private:
-  absl::StatusOr<TaskOutput> execute(const executor::Command::Run& run, const CancelFlag* cancel) {
+  absl::StatusOr<TaskOutput> execute(const executor::Command::Run& run, const CancelFlag* cancel) try {
     BakeControl control;
     control.threads = static_cast<int>(run.threads());
     control.cancel = cancel;
@@ -71,6 +71,8 @@ class Tasks {
       send(report);
     };
     return run_within_memory(executor_, to_task(run.task()), control);
+  } catch (const std::bad_alloc&) {  // before it ran
+    return out_of_memory(run.task().kind());
   }
   void finish(uint64_t id, const absl::StatusOr<TaskOutput>& output) {
     {

@@ -1,8 +1,6 @@
 #include "bake-worker/local_executor.h"
 
-#include <chrono>
-
-#include "proto/client.h"
+#include "bake-worker/patience.h"
 
 namespace lightloom {
 namespace {
@@ -14,7 +12,9 @@ thread_local const CancelFlag* cancel_of_task = nullptr;
 class RemoteBlobs final : public BlobAccess {
  public:
   RemoteBlobs(std::shared_ptr<grpc::Channel> channel, ComputeGate* gate)
-      : client_(std::move(channel), patience()), gate_(gate) {}
+      : client_(std::move(channel),
+                patience_of_tasks([] { return cancel_of_task != nullptr && cancel_of_task->cancelled(); })),
+        gate_(gate) {}
   absl::StatusOr<std::vector<uint8_t>> get(const Digest& digest) override {
     const ComputeGate::Pause pause(gate_);
     return client_.download(digest);
@@ -25,15 +25,6 @@ class RemoteBlobs final : public BlobAccess {
   }
 
  private:
-  /// A server that restarts, or has a full disk for a while, should not cost the work of minutes.
-  static Patience patience() {
-    Patience p;
-    p.total = std::chrono::minutes(10);
-    p.call = std::chrono::seconds(60);
-    p.wait_for_room = true;
-    p.give_up = [] { return cancel_of_task != nullptr && cancel_of_task->cancelled(); };
-    return p;
-  }
   BlobClient client_;
   ComputeGate* gate_;
 };

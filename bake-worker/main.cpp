@@ -1,7 +1,6 @@
 // lightloom-worker: one baker of a farm. This process speaks with the server; a child of it does the work.
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
-#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -12,6 +11,7 @@
 #include <thread>
 
 #include "bake-worker/child_executor.h"
+#include "bake-worker/default_name.h"
 #include "bake-worker/join.h"
 #include "bake-worker/memory_limits.h"
 #include "bake-worker/worker.h"
@@ -20,14 +20,9 @@
 #include "core/base/stop_signal.h"
 #include "core/base/version.h"
 #include "proto/client.h"
+#include "proto/worker_name.h"
 
 namespace {
-
-std::string default_name() {
-  char host[48] = "worker";
-  gethostname(host, sizeof host - 1);
-  return std::string(host) + "-" + std::to_string(getpid());
-}
 
 /// For an option that takes a size.
 CLI::Option* add_size(CLI::App* app, const char* name, uint64_t* bytes, const char* help) {
@@ -63,14 +58,17 @@ int main(int argc, char** argv) {
   CLI::App app{
       "Bakes for a farm: joins a server, runs its tasks until SIGINT or SIGTERM, then finishes those that it has; a "
       "second signal hands them back."};
-  std::string name = default_name();
+  std::string name = lightloom::default_worker_name();
   uint32_t timeout = 10;
   lightloom::ExecutorConfig config;
   config.threads = std::max(1u, std::thread::hardware_concurrency());
   config.cache_bytes = lightloom::usable_memory() / 4;
   app.add_option("--server", config.server, "HOST:PORT of lightloom-server")->required();
   app.add_option("--threads", config.threads, "tasks at once")->check(CLI::Range(1, 1024))->capture_default_str();
-  app.add_option("--name", name, "letters, digits, dots and dashes; no two workers may share one");
+  app.add_option("--name", name, "letters, digits, dots, dashes, underscores; no two workers may share one")
+      ->check([](const std::string& text) {
+        return std::string(lightloom::is_worker_name(text) ? "" : lightloom::kWorkerNameRule);
+      });
   add_size(&app, "--cache", &config.cache_bytes, "memory for levels that are kept warm [a quarter of the memory]");
   add_size(&app, "--memory", &config.memory_bytes, "address space that tasks may use, like 8G [0: no limit]");
   app.add_option("--timeout", timeout, "seconds to wait for the server at the start")
@@ -97,9 +95,10 @@ int main(int argc, char** argv) {
   spdlog::info("{} joined {} (version {}) with {} threads", name, config.server, *joined, config.threads);
 
   lightloom::ChildOptions child{config};
-  child.on_end = [](const std::string& what) { spdlog::warn("{}", what); };
+  const auto warn = [](const std::string& what) { spdlog::warn("{}", what); };
+  child.on_end = warn;
   lightloom::ChildExecutor executor(child);
-  lightloom::Worker worker(channel, &executor, {name, who});
+  lightloom::Worker worker(channel, &executor, {name, who, warn});
   stop_on_signals(&signals, &worker);
   if (const absl::Status ended = worker.run(); !ended.ok()) return fail("leaving " + config.server, ended);
   spdlog::info("left {}", config.server);

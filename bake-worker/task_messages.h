@@ -25,18 +25,24 @@ BakeTask to_task(const Assignment& a) {
   return task;
 }
 
-/// To a SyncRequest.Finished.
-template <class Finished>
-void to_proto(const TaskOutput& output, Finished* out) {
-  out->set_rays(output.rays);
-  for (const Digest& d : output.outputs) out->add_outputs(to_bytes(d));
-  for (const SpawnedTask& s : output.spawned) {
+/// To what has `tasks`: a SyncRequest.Finished, a TaskList.
+template <class Message>
+void add_tasks(const std::vector<SpawnedTask>& tasks, Message* out) {
+  for (const SpawnedTask& s : tasks) {
     auto* t = out->add_tasks();
     t->set_kind(s.kind);
     t->set_stage(s.stage);
     t->set_argument(s.argument.data(), s.argument.size());
     t->set_order(s.order);
   }
+}
+
+/// To a SyncRequest.Finished.
+template <class Finished>
+void to_proto(const TaskOutput& output, Finished* out) {
+  out->set_rays(output.rays);
+  for (const Digest& d : output.outputs) out->add_outputs(to_bytes(d));
+  add_tasks(output.spawned, out);
 }
 
 template <class Finished>

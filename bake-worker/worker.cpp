@@ -8,6 +8,7 @@
 #include <random>
 
 #include "bake-worker/task_messages.h"
+#include "bake-worker/tasks_blob.h"
 #include "proto/client.h"
 #include "proto/worker_service.grpc.pb.h"
 
@@ -19,6 +20,9 @@ constexpr std::chrono::milliseconds kProgressEvery{1000}, kIdleWait{10'000}, kCa
 constexpr std::chrono::milliseconds kTogether{100};
 /// Work that is kept in hand for each thread, seconds; at most as many tasks as are begun at once.
 constexpr double kAheadSeconds = 0.25;
+
+/// So many tasks that fail one after the other say more about the worker than about themselves.
+constexpr int kManyFailures = 10;
 
 /// More than threads: some wait for the network.
 uint32_t begun_at_once(uint32_t threads) { return threads + 1 + threads / 8; }
@@ -77,7 +81,10 @@ void Worker::stop() {
 /// There may be something to say.
 void Worker::tell() {
   if (has_news() && news_since_ == Clock::time_point()) news_since_ = Clock::now();
-  if (waiting_ != nullptr) waiting_->TryCancel();
+  if (waiting_ != nullptr) {
+    waiting_->TryCancel();
+    interrupted_ = true;
+  }
   changed_.notify_all();
 }
 
@@ -106,37 +113,71 @@ void Worker::run_task(const std::string& attempt, Running* running) {
   if (!running->cancel.cancelled()) output = run_within_memory(&executor_, running->task, control);
   const double seconds = std::chrono::duration<double>(Clock::now() - begun).count();
   const absl::Status health = output.ok() ? absl::OkStatus() : executor_.health();
+  Report report = report_of(std::move(output), running->cancel);
 
-  const std::lock_guard lock(mutex_);
+  std::unique_lock lock(mutex_);
+  std::string trouble;
   if (!health.ok() && health_.ok()) {
     health_ = health;
     drain_locked();
   }
   if (running->lost) {
     hungry_ = true;
-  } else if (absl::IsCancelled(output.status()) || !health.ok()) {
+  } else if (absl::IsCancelled(report.output.status()) || !health.ok()) {
     released_.push_back(attempt);
   } else {
-    if (output.ok()) mean_seconds_ = mean_seconds_ > 0 ? (mean_seconds_ + seconds) / 2 : seconds;
-    finished_.emplace(attempt, std::move(output));
+    if (report.output.ok()) {
+      mean_seconds_ = mean_seconds_ > 0 ? (mean_seconds_ + seconds) / 2 : seconds;
+      failed_in_row_ = 0;
+    } else if (++failed_in_row_ == kManyFailures) {
+      trouble = std::to_string(kManyFailures) +
+                " tasks in a row failed here, the last one: " + std::string(report.output.status().message());
+    }
+    finished_.emplace(attempt, std::move(report));
   }
   running_.erase(attempt);
   tell();
+  lock.unlock();
+  if (!trouble.empty()) options_.on_trouble(trouble);
+}
+
+/// What has to be uploaded for it is on the server.
+Worker::Report Worker::report_of(absl::StatusOr<TaskOutput> output, const CancelFlag& cancel) {
+  if (!output.ok()) return {std::move(output), std::nullopt};
+  auto blob = upload_if_long(channel_, output->spawned, cancel);
+  if (!blob.ok()) return {cancel.cancelled() ? absl::CancelledError("cancelled") : blob.status(), std::nullopt};
+  if (*blob) output->spawned.clear();
+  return {std::move(output), *blob};
 }
 
 absl::Status Worker::run() {
   for (;;) {
     const absl::Status status = sync_once();
     if (is_final(status, synced_ != Clock::time_point())) return status;
+    note(status);
     std::unique_lock lock(mutex_);
     if (draining_ && running_.empty() && !has_news()) return health_;
     if (stopping_ && !status.ok()) return health_;  // nobody hears what is handed back: its lease ends
-    if (absl::IsAborted(status) || absl::IsCancelled(status)) continue;
+    if (absl::IsCancelled(status) && interrupted_) continue;
     if (status.ok()) {
       for (auto at = next_sync(); Clock::now() < at; at = next_sync()) changed_.wait_until(lock, at);
     } else {
       changed_.wait_for(lock, kRetry, [&] { return stopping_; });
     }
+  }
+}
+
+/// Tells of Syncs that begin to fail, and of those that work again.
+void Worker::note(const absl::Status& sync) {
+  if (absl::IsAborted(sync) || absl::IsCancelled(sync)) return;  // overtaken, or ended by news
+  if (sync.ok()) {
+    if (!troubles_.empty()) options_.on_trouble("the server answers again");
+    troubles_.clear();
+    return;
+  }
+  const bool away = absl::IsDeadlineExceeded(sync) || absl::IsUnimplemented(sync);
+  if (troubles_.insert(away ? absl::StatusCode::kUnavailable : sync.code()).second) {
+    options_.on_trouble("the server takes no Syncs, asking again until it does: " + std::string(sync.message()));
   }
 }
 
@@ -153,7 +194,9 @@ uint32_t Worker::room() const {
   const uint32_t threads = options_.who.threads, most = begun_at_once(threads);
   const double ahead = mean_seconds_ > 0 ? threads * kAheadSeconds / mean_seconds_ : 0;
   const size_t wanted = threads + static_cast<size_t>(std::min<double>(ahead, most));
-  return wanted > running_.size() ? static_cast<uint32_t>(wanted - running_.size()) : 0;
+  const auto in_hand = static_cast<size_t>(
+      std::count_if(running_.begin(), running_.end(), [](const auto& running) { return !running.second->warm; }));
+  return wanted > in_hand ? static_cast<uint32_t>(wanted - in_hand) : 0;
 }
 
 absl::Status Worker::sync_once() {
@@ -173,20 +216,22 @@ absl::Status Worker::sync_once() {
       r->set_attempt(attempt);
       r->set_rays(running->rays);
     }
-    for (const auto& [attempt, output] : finished_) {
-      if (!output.ok()) {
+    for (const auto& [attempt, report] : finished_) {
+      if (!report.output.ok()) {
         auto* f = request.add_failed();
         f->set_attempt(attempt);
-        f->set_reason(std::string(output.status().message()));
+        f->set_reason(std::string(report.output.status().message()));
         continue;
       }
       auto* f = request.add_finished();
       f->set_attempt(attempt);
-      lightloom::to_proto(*output, f);
+      lightloom::to_proto(*report.output, f);
+      if (report.tasks_blob) f->set_tasks_blob(to_bytes(*report.tasks_blob));
     }
     for (const std::string& attempt : released_) request.add_released(attempt);
     request.set_room(room());
     news_since_ = {};
+    interrupted_ = false;
     if (request.room() > 0 && !has_news()) {
       request.set_wait_ms(static_cast<uint32_t>((running_.empty() ? kIdleWait : kProgressEvery).count()));
       waiting_ = &context;
@@ -207,24 +252,47 @@ absl::Status Worker::sync_once() {
     std::erase(released_, attempt);
   }
   for (const std::string& attempt : response.lost()) lose(attempt);
-  for (const std::string& payload : response.warm()) {
-    // Nobody waits for it; what the server gives out goes before it.
-    auto running = std::make_shared<Running>();
-    running->task = {"warm", {payload.begin(), payload.end()}, {}, {}};
-    running->lost = true;
-    const std::string name = "warm " + std::to_string(++arrivals_);
-    running_.emplace(name, std::move(running));
-    queue_.emplace(std::pair(std::numeric_limits<int64_t>::max(), arrivals_), name);
-  }
+  for (const std::string& payload : response.warm()) take_warm_up(payload);
   for (const auto& a : response.assignments()) {
-    if (running_.contains(a.attempt()) || finished_.contains(a.attempt())) continue;  // it came twice
+    if (has(a.attempt())) continue;  // it came twice
+    if (draining_) {                 // since the Sync was sent
+      released_.push_back(a.attempt());
+      continue;
+    }
     auto running = std::make_shared<Running>();
     running->task = to_task(a);
+    cancel_warm_ups_for(running->task);
     running_.emplace(a.attempt(), std::move(running));
     queue_.emplace(std::pair(-int64_t{a.priority()}, ++arrivals_), a.attempt());
   }
-  changed_.notify_all();
+  tell();
   return absl::OkStatus();
+}
+
+bool Worker::has(const std::string& attempt) const {
+  return running_.contains(attempt) || finished_.contains(attempt) ||
+         std::find(released_.begin(), released_.end(), attempt) != released_.end();
+}
+
+/// Nobody waits for it; what the server gives out goes before it. One level at a time.
+void Worker::take_warm_up(const std::string& payload) {
+  if (draining_) return;
+  if (std::any_of(running_.begin(), running_.end(), [](const auto& running) { return running.second->warm; })) return;
+  auto running = std::make_shared<Running>();
+  running->task = {"warm", {payload.begin(), payload.end()}, {}, {}};
+  running->lost = running->warm = true;
+  const std::string name = "warm " + std::to_string(++arrivals_);
+  running_.emplace(name, std::move(running));
+  queue_.emplace(std::pair(std::numeric_limits<int64_t>::max(), arrivals_), name);
+}
+
+/// Those of other levels: real work must not wait for them.
+void Worker::cancel_warm_ups_for(const BakeTask& task) {
+  std::vector<std::string> others;
+  for (const auto& [name, running] : running_) {
+    if (running->warm && running->task.payload != task.payload) others.push_back(name);
+  }
+  for (const std::string& name : others) lose(name);
 }
 
 void Worker::lose(const std::string& attempt) {

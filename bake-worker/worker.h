@@ -5,9 +5,12 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -23,8 +26,11 @@ class ClientContext;
 namespace lightloom {
 
 struct WorkerOptions {
-  std::string name;  ///< [A-Za-z0-9._-], 1 to 64; stays the same when the process restarts
+  std::string name;  ///< by the rule of proto/worker_name.h; no two workers share one
   Introduction who;  ///< who.threads: tasks that compute at once
+  /// Told in one line: that Syncs fail and why, once for each kind of error, and that they work again; that many tasks
+  /// in a row failed. From any thread of the worker.
+  std::function<void(const std::string&)> on_trouble = [](const std::string&) {};
 };
 
 /// Begins somewhat more tasks than may compute, so that cores have work while results are on their way, and has more of
@@ -52,14 +58,24 @@ class Worker {
     std::atomic<uint64_t> rays{0};
     CancelFlag cancel;
     bool lost = false;  // nobody waits for it, or not any more
+    bool warm = false;  // nobody ever did: it makes a level ready for tasks that are on their way
+  };
+  struct Report {
+    absl::StatusOr<TaskOutput> output;
+    std::optional<Digest> tasks_blob;  // holds output.spawned, which is empty then
   };
 
   void execute();
   void run_task(const std::string& attempt, Running* running);
+  Report report_of(absl::StatusOr<TaskOutput> output, const CancelFlag& cancel);
   absl::Status sync_once();
+  void note(const absl::Status& sync);
   /// These need mutex_.
   void drain_locked();
   uint32_t room() const;
+  bool has(const std::string& attempt) const;
+  void take_warm_up(const std::string& payload);
+  void cancel_warm_ups_for(const BakeTask& task);
   bool has_news() const { return !finished_.empty() || !released_.empty(); }
   Clock::time_point next_sync() const;
   void tell();
@@ -72,18 +88,22 @@ class Worker {
   std::mutex mutex_;  // guards all below
   std::condition_variable changed_;
   bool draining_ = false, stopping_ = false, ended_ = false;
-  std::map<std::string, std::shared_ptr<Running>> running_;     // by attempt: begun or not
-  std::map<std::pair<int64_t, uint64_t>, std::string> queue_;   // not begun, by (-priority, arrival)
-  std::map<std::string, absl::StatusOr<TaskOutput>> finished_;  // to be reported until acknowledged
+  std::map<std::string, std::shared_ptr<Running>> running_;    // by attempt: begun or not
+  std::map<std::pair<int64_t, uint64_t>, std::string> queue_;  // not begun, by (-priority, arrival)
+  std::map<std::string, Report> finished_;                     // to be reported until acknowledged
   std::vector<std::string> released_;
   absl::Status health_;                    // the executor's
   bool hungry_ = true;                     // the server had less than there was room for
   Clock::time_point synced_, news_since_;  // last answer; first news since the last Sync was sent
   double mean_seconds_ = 0;                // of recent tasks; 0: not known
   uint64_t arrivals_ = 0;
+  int failed_in_row_ = 0;                   // tasks
   grpc::ClientContext* waiting_ = nullptr;  // a Sync that news should end
+  bool interrupted_ = false;                // news did end the last Sync
   uint64_t incarnation_ = 0, sequence_ = 0, seen_ = 0;
   std::vector<std::thread> threads_;
+
+  std::set<absl::StatusCode> troubles_;  // told since Syncs worked; of run()'s thread
 };
 
 }  // namespace lightloom

@@ -282,10 +282,10 @@ absl::StatusOr<Manifest> FarmClient::fetch(uint64_t id, const std::string& loom,
                                            const std::function<void(uint64_t, uint64_t)>& progress) {
   LL_ASSIGN_OR_RETURN(const RemoteJob job, this->job(id));
   if (job.state != "done" || job.outputs.empty()) {
-    return absl::FailedPreconditionError("job " + std::to_string(id) + " of " + server_ + " is " + job.state +
-                                         (job.error.empty() ? "" : " (" + job.error + ")") +
-                                         "; only what is done can be fetched" +
-                                         (job.ended() ? "" : ": lightloom watch " + std::to_string(id)));
+    return absl::FailedPreconditionError(
+        "job " + std::to_string(id) + " of " + server_ + " is " + job.state +
+        (job.error.empty() ? "" : " (" + job.error + ")") + "; only what is done can be fetched" +
+        (job.ended() ? "" : ": lightloom watch " + std::to_string(id) + " --server " + server_));
   }
   const auto bytes = connection_->blobs.download(job.outputs.front());
   if (!bytes.ok()) return in_words(bytes.status());

@@ -18,7 +18,7 @@ struct FarmOptions {
   uint64_t job = 0;
   bool json = false;
 
-  /// --timeout in range. InvalidArgument.
+  /// --server is HOST:PORT, --timeout in range. InvalidArgument.
   absl::Status check() const;
   /// Calls give up after --timeout, or when interrupted() (cli/interrupt.h).
   FarmClient connect() const;

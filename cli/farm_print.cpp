@@ -1,5 +1,6 @@
 #include "cli/farm_print.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <ctime>
 #include <nlohmann/json.hpp>
@@ -41,18 +42,28 @@ std::string progress_line(const RemoteJob& job) {
   if (job.reused > 0) line += " (" + std::to_string(job.reused) + " reused)";
   if (job.failed > 0) line += ", " + std::to_string(job.failed) + " failed";
   if (job.ended()) return line;
-  if (job.workers == 0) return line + ", waiting for a worker";
+  if (job.running == 0) return line + ", waiting for a worker";
   line += ", " + std::to_string(job.running) + " running on " + std::to_string(job.workers) +
           (job.workers == 1 ? " worker" : " workers");
   if (job.rays_per_second > 0) line += ", " + human_count(job.rays_per_second) + "rays/s";
   return line;
 }
 
-absl::Status how_it_ended(const RemoteJob& job) {
+std::string worker_line(const RemoteWorker& worker) {
+  constexpr int64_t kGoneMs = 60'000;
+  const std::string silence = human_seconds(1e-3 * static_cast<double>(worker.silent_ms));
+  std::string name = worker.id;
+  name.resize(std::max<size_t>(name.size(), 32), ' ');
+  if (worker.silent_ms > kGoneMs) return name + "  gone, heard " + silence + " ago";
+  return name + "  " + std::to_string(worker.running) + " of " + std::to_string(worker.threads) +
+         " threads busy, heard " + silence + " ago" + (worker.draining ? ", leaving" : "");
+}
+
+absl::Status how_it_ended(const RemoteJob& job, const std::string& server) {
   if (job.state == "done") return absl::OkStatus();
   return absl::AbortedError("job " + std::to_string(job.id) + " ended " + job.state +
                             (job.error.empty() ? "" : ": " + job.error) + "; see lightloom events " +
-                            std::to_string(job.id));
+                            std::to_string(job.id) + " --server " + server);
 }
 
 std::string local_time(int64_t unix_ms) {

@@ -65,7 +65,7 @@ absl::StatusOr<FarmBake> farm_bake(FarmClient* farm, const std::string& server, 
       return with(end.status(), "job " + id + " stays there: lightloom watch " + id + " --server " + server);
     out.job = *std::move(end);
   }
-  LL_RETURN_IF_ERROR(how_it_ended(out.job));
+  LL_RETURN_IF_ERROR(how_it_ended(out.job, server));
   const Stopwatch write_watch;
   const auto manifest = fetch_asset(farm, out.job.id, loom);
   if (!manifest.ok()) {

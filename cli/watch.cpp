@@ -23,7 +23,7 @@ absl::Status run(const FarmOptions& o) {
                 human_seconds(1e-3 * static_cast<double>(job.finished_ms - job.created_ms)).c_str(),
                 progress_line(job).c_str());
   }
-  return how_it_ended(job);
+  return how_it_ended(job, o.server);
 }
 
 }  // namespace

@@ -4,8 +4,8 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/farm_command.h"
+#include "cli/farm_print.h"
 #include "cli/print_json.h"
-#include "cli/progress.h"
 
 namespace lightloom {
 namespace {
@@ -26,10 +26,7 @@ absl::Status run(const FarmOptions& o) {
     print_json({{"workers", all}});
     return absl::OkStatus();
   }
-  for (const RemoteWorker& w : workers) {
-    std::printf("%-32s  %u of %u threads busy, heard %s ago%s\n", w.id.c_str(), w.running, w.threads,
-                human_seconds(1e-3 * static_cast<double>(w.silent_ms)).c_str(), w.draining ? ", leaving" : "");
-  }
+  for (const RemoteWorker& w : workers) std::printf("%s\n", worker_line(w).c_str());
   if (workers.empty()) std::printf("no workers\n");
   return absl::OkStatus();
 }

@@ -21,7 +21,7 @@ absl::Status serve(const ServeOptions& options);
 /// Prints what it freed.
 absl::Status gc(const std::string& state, int64_t grace_seconds, bool dry_run, const CancelFlag& cancel);
 
-/// Prints what it copied.
+/// Prints what it copied. DataLoss: it is there, but blobs are missing.
 absl::Status backup(const std::string& state, const std::string& to, const CancelFlag& cancel);
 
 }  // namespace lightloom

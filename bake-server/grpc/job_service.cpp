@@ -103,9 +103,9 @@ class Watching final : public grpc::ServerWriteReactor<v1::Job> {
     hand_over_.hold().unlock();
     if (!ok) return shared_->end(grpc::Status::CANCELLED);
     // The coordinator may call back after the call has ended, so what both touch lives as long as either.
-    coordinator_->watch(job_, after_,
-                        [shared = shared_](const absl::StatusOr<JobStatus>& job) { return shared->changed(job); },
-                        [shared = shared_] { return shared->over(); });
+    coordinator_->watch(
+        job_, after_, [shared = shared_](const absl::StatusOr<JobStatus>& job) { return shared->changed(job); },
+        [shared = shared_] { return shared->over(); });
   }
   void OnWriteDone(bool ok) override {
     const auto lock = hand_over_.hold();

@@ -34,7 +34,7 @@ struct Server::Parts {
     builder->AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
     builder->SetMaxReceiveMessageSize(kMaxMessageBytes);
     services.push_back(make_job_service(info, &farm->coordinator()));
-    services.push_back(make_worker_service(info, &farm->coordinator()));
+    services.push_back(make_worker_service(info, &farm->coordinator(), &farm->blobs()));
     services.push_back(make_blob_service(&farm->blobs()));
     for (const auto& service : services) builder->RegisterService(service.get());
     server = builder->BuildAndStart();

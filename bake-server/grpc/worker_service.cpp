@@ -5,6 +5,7 @@
 #include "bake-server/grpc/tasks.h"
 #include "bake-server/grpc/translate.h"
 #include "core/base/text.h"
+#include "proto/worker_name.h"
 #include "proto/worker_service.grpc.pb.h"
 
 namespace lightloom {
@@ -12,6 +13,7 @@ namespace {
 
 constexpr uint32_t kMaxWaitMs = 30'000, kMaxRoom = 4096;
 constexpr size_t kMaxReasonBytes = 1024;
+constexpr uint64_t kMaxTaskListBytes = uint64_t{256} << 20;
 
 v1::JoinResponse::Refused::Reason to_proto(Refusal refusal) {
   using Refused = v1::JoinResponse::Refused;
@@ -42,16 +44,26 @@ Admission admit(const v1::JoinRequest& request, const ServerInfo& info) {
                           info);
 }
 
-bool is_worker_name(const std::string& name) {
-  return !name.empty() && name.size() <= 64 && std::all_of(name.begin(), name.end(), [](unsigned char c) {
-    return std::isalnum(c) || c == '.' || c == '_' || c == '-';
-  });
+/// What a finished task asks for. NotFound and InvalidArgument are the task's fault, others the server's.
+absl::StatusOr<std::vector<NewTask>> tasks_of(const v1::SyncRequest::Finished& finished, const BlobStore& blobs) {
+  if (finished.tasks_blob().empty()) return to_tasks(finished.tasks());
+  LL_ASSIGN_OR_RETURN(const Digest digest, to_digest(finished.tasks_blob()));
+  LL_ASSIGN_OR_RETURN(const uint64_t size, blobs.size(digest));
+  if (size > kMaxTaskListBytes) {
+    return absl::InvalidArgumentError("its list of tasks has " + std::to_string(size) + " bytes, the limit is " +
+                                      std::to_string(kMaxTaskListBytes) +
+                                      "; make tasks larger, so that they are fewer");
+  }
+  LL_ASSIGN_OR_RETURN(const std::vector<uint8_t> bytes, blobs.read(digest, 0, size));
+  v1::TaskList list;
+  if (!list.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
+    return absl::InvalidArgumentError("blob " + digest.hex() + " is no list of tasks");
+  }
+  return to_tasks(list.tasks());
 }
 
-absl::StatusOr<SyncMessage> to_message(const v1::SyncRequest& request) {
-  if (!is_worker_name(request.worker())) {
-    return absl::InvalidArgumentError("a worker's name must have 1 to 64 letters, digits, dots, dashes or underscores");
-  }
+absl::StatusOr<SyncMessage> to_message(const v1::SyncRequest& request, const BlobStore& blobs) {
+  if (!is_worker_name(request.worker())) return absl::InvalidArgumentError(kWorkerNameRule);
   SyncMessage out;
   out.worker = request.worker();
   out.version = printable(request.who().version(), 64);
@@ -68,7 +80,13 @@ absl::StatusOr<SyncMessage> to_message(const v1::SyncRequest& request) {
     for (const std::string& d : f.outputs()) {
       LL_ASSIGN_OR_RETURN(finished.outputs.emplace_back(), to_digest(d));
     }
-    LL_ASSIGN_OR_RETURN(finished.tasks, to_tasks(f.tasks()));
+    auto tasks = tasks_of(f, blobs);
+    if (absl::IsNotFound(tasks.status()) || absl::IsInvalidArgument(tasks.status())) {
+      out.failed.push_back({f.attempt(), std::string(tasks.status().message())});
+      continue;
+    }
+    LL_RETURN_IF_ERROR(tasks.status());
+    finished.tasks = *std::move(tasks);
     out.finished.push_back(std::move(finished));
   }
   for (const auto& f : request.failed()) {
@@ -130,7 +148,8 @@ class Syncing final : public grpc::ServerUnaryReactor {
 
 class WorkerService final : public v1::WorkerService::CallbackService {
  public:
-  WorkerService(ServerInfo info, Coordinator* coordinator) : info_(std::move(info)), coordinator_(coordinator) {}
+  WorkerService(ServerInfo info, Coordinator* coordinator, const BlobStore* blobs)
+      : info_(std::move(info)), coordinator_(coordinator), blobs_(*blobs) {}
 
   grpc::ServerUnaryReactor* Join(grpc::CallbackServerContext* context, const v1::JoinRequest* request,
                                  v1::JoinResponse* response) override {
@@ -152,7 +171,7 @@ class WorkerService final : public v1::WorkerService::CallbackService {
     // A server of another release may have taken this one's place since the worker joined.
     const Admission admission = admit(request->who(), info_);
     if (!admission.accepted()) return finish(context, absl::FailedPreconditionError(admission.message));
-    auto message = to_message(*request);
+    auto message = to_message(*request, blobs_);
     if (!message.ok()) return finish(context, message.status());
     return new Syncing(coordinator_, *std::move(message), response);
   }
@@ -160,12 +179,14 @@ class WorkerService final : public v1::WorkerService::CallbackService {
  private:
   const ServerInfo info_;
   Coordinator* coordinator_;
+  const BlobStore& blobs_;
 };
 
 }  // namespace
 
-std::unique_ptr<grpc::Service> make_worker_service(const ServerInfo& info, Coordinator* coordinator) {
-  return std::make_unique<WorkerService>(info, coordinator);
+std::unique_ptr<grpc::Service> make_worker_service(const ServerInfo& info, Coordinator* coordinator,
+                                                   const BlobStore* blobs) {
+  return std::make_unique<WorkerService>(info, coordinator, blobs);
 }
 
 }  // namespace lightloom

@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "bake-server/blobs/blob_store.h"
 #include "bake-server/coordinator/coordinator.h"
 #include "bake-server/scheduler/admission.h"
 
@@ -12,7 +13,8 @@ class Service;
 
 namespace lightloom {
 
-/// `coordinator` must outlive it.
-std::unique_ptr<grpc::Service> make_worker_service(const ServerInfo& info, Coordinator* coordinator);
+/// Long lists of tasks are read from `blobs`. Both must outlive it.
+std::unique_ptr<grpc::Service> make_worker_service(const ServerInfo& info, Coordinator* coordinator,
+                                                   const BlobStore* blobs);
 
 }  // namespace lightloom

@@ -28,8 +28,14 @@ absl::Status failed(const char* what, const fs::path& path, const std::string& r
       absl::StrCat("cannot ", what, " ", path.string(), ": ", reason, "; check that disk and its permissions"));
 }
 
-absl::Status check_target(const fs::path& to) {
+absl::Status check_target(const fs::path& state, const fs::path& to) {
   std::error_code error;
+  const fs::path within = fs::weakly_canonical(to, error).lexically_relative(fs::weakly_canonical(state, error));
+  if (!error && !within.empty() && *within.begin() != "..") {
+    return absl::FailedPreconditionError(absl::StrCat("cannot back up to ", to.string(),
+                                                      ": it lies in the state folder ", state.string(),
+                                                      ": name a folder outside of it"));
+  }
   if (!fs::exists(fs::symlink_status(to, error))) return absl::OkStatus();
   if (fs::is_directory(fs::symlink_status(to, error)) && fs::is_empty(to, error) && !error) return absl::OkStatus();
   return absl::FailedPreconditionError(
@@ -72,24 +78,21 @@ absl::Status copy_blob(const Digest& digest, uint64_t size, const BlobStore& fro
   return absl::OkStatus();
 }
 
+/// NotFound, DataLoss: it is missing or damaged.
 absl::Status add_blob(const Digest& digest, const fs::path& state, const BlobStore& from, const fs::path& draft,
                       BlobStore* to, Backup* backup) {
   const BlobLayout source(state / "blobs"), copy(draft / "blobs");
-  const auto size = from.size(digest);
-  if (!size.ok()) {
-    return absl::DataLossError(absl::StrCat("blob ", digest.hex(), ", which a job names, is not in ",
-                                            source.folder().string(), ": put it back from an earlier backup"));
-  }
+  LL_ASSIGN_OR_RETURN(const uint64_t size, from.size(digest));
   std::error_code error;
   fs::create_directories(copy.blob(digest).parent_path(), error);
   if (error) return failed("make", copy.blob(digest).parent_path(), error.message());
   if (::link(source.blob(digest).c_str(), copy.blob(digest).c_str()) == 0) {
     ++backup->linked;
   } else {
-    LL_RETURN_IF_ERROR(copy_blob(digest, *size, from, to));
+    LL_RETURN_IF_ERROR(copy_blob(digest, size, from, to));
   }
   ++backup->blobs;
-  backup->bytes += *size;
+  backup->bytes += size;
   return absl::OkStatus();
 }
 
@@ -97,8 +100,8 @@ absl::Status add_blob(const Digest& digest, const fs::path& state, const BlobSto
 
 absl::StatusOr<Backup> back_up(const fs::path& state, const fs::path& target, const CancelFlag* cancel) {
   const fs::path to = (target / "").parent_path();  // without a slash at the end
-  LL_RETURN_IF_ERROR(check_target(to));
   LL_ASSIGN_OR_RETURN(const auto original, open_sqlite_reader(state));
+  LL_RETURN_IF_ERROR(check_target(state, to));
   LL_ASSIGN_OR_RETURN(const UpkeepLock lock, UpkeepLock::wait(state));
 
   // The database first: blobs are there before it names them.
@@ -124,7 +127,12 @@ absl::StatusOr<Backup> back_up(const fs::path& state, const fs::path& target, co
   Backup backup;
   for (const Digest& digest : digests) {
     if (cancel != nullptr && cancel->cancelled()) return absl::CancelledError("the backup was stopped");
-    LL_RETURN_IF_ERROR(add_blob(digest, state, *from, draft.path(), into.get(), &backup));
+    const absl::Status added = add_blob(digest, state, *from, draft.path(), into.get(), &backup);
+    if (absl::IsNotFound(added) || absl::IsDataLoss(added)) {
+      if (backup.missing++ == 0) backup.first_missing = digest;
+    } else {
+      LL_RETURN_IF_ERROR(added);
+    }
   }
 
   LL_RETURN_IF_ERROR(sync_file_system(draft.path()));
@@ -136,6 +144,15 @@ absl::StatusOr<Backup> back_up(const fs::path& state, const fs::path& target, co
 std::string backup_text(const Backup& backup) {
   return absl::StrCat(backup.blobs, backup.blobs == 1 ? " blob, " : " blobs, ", size_text(backup.bytes), ", ",
                       backup.linked, " of them linked");
+}
+
+absl::Status check_whole(const Backup& backup, const fs::path& to) {
+  if (backup.missing == 0) return absl::OkStatus();
+  const std::string blobs =
+      backup.missing == 1 ? "a blob that a job names is missing or damaged: "
+                          : absl::StrCat(backup.missing, " blobs that jobs name are missing or damaged, the first is ");
+  return absl::DataLossError(absl::StrCat("the backup ", to.string(), " has all else, but ", blobs,
+                                          backup.first_missing.hex(), "; put it back from an earlier backup"));
 }
 
 }  // namespace lightloom

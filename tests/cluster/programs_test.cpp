@@ -228,6 +228,7 @@ TEST_F(Programs, BakeOnAFarmIsOneCommand) {
 
   fails(2, {"bake", scene_, "-o", path("x.loom"), "--server", server->address(), "--threads", "2"}, "--threads");
   fails(2, {"list", "--server", server->address(), "--timeout", "0"}, "--timeout");
+  fails(2, {"bake", scene_, "-o", path("x.loom"), "--server", "localhost"}, "must be HOST:PORT");
 }
 
 TEST_F(Programs, CtrlCCancelsABakeOnAFarmAndASecondLeavesAtOnce) {
@@ -269,6 +270,7 @@ TEST_F(Programs, CancelEndsAJobAndFreesItsWorker) {
   EXPECT_EQ(run({"cancel", job, "--server", server->address()}).out, "job " + job + ": cancelled\n");
   EXPECT_EQ(watch->wait(), 1);
   EXPECT_THAT(watch->output(), HasSubstr("ended cancelled"));
+  EXPECT_THAT(watch->output(), HasSubstr("lightloom events " + job + " --server " + server->address()));
   fails(1, {"fetch", job, "--server", server->address(), "-o", path("x.loom")}, "is cancelled");
   EXPECT_FALSE(fs::exists(path("x.loom")));
 
@@ -305,6 +307,18 @@ TEST_F(Programs, WhatWatchPrintsWithoutATerminal) {
   EXPECT_NE(watch.line_with(" running on 1 worker"), "") << watch.output();
   EXPECT_EQ(watch.wait(), 0);
   EXPECT_THAT(watch.output(), HasSubstr("job 1: done after "));
+}
+
+TEST_F(Programs, WhatIsNoAddressIsNotCalled) {
+  std::vector<Words> commands = commands_on_job("1");
+  commands.insert(commands.end(), {{"list"}, {"workers"}, {"submit", scene_}});
+  for (const Words& command : commands) {
+    SCOPED_TRACE(command.front());
+    for (const char* server : {"", "localhost", "localhost:", ":7000", "host:0", "host:65536", "host:http", "::1:7000",
+                               "unix:/a/socket:1"}) {
+      fails(2, join(command, {"--server", server}), "must be HOST:PORT");
+    }
+  }
 }
 
 TEST_F(Programs, NobodyListens) {
@@ -351,7 +365,8 @@ TEST_F(Programs, JobsThatAreNotThere) {
 TEST_F(Programs, WhatIsNotDoneIsNotFetched) {
   const auto server = start_server();
   const std::string job = submit(server->address(), scene_, how());
-  fails(1, {"fetch", job, "--server", server->address(), "-o", path("x.loom")}, "lightloom watch " + job);
+  fails(1, {"fetch", job, "--server", server->address(), "-o", path("x.loom")},
+        "lightloom watch " + job + " --server " + server->address());
   EXPECT_FALSE(fs::exists(path("x.loom")));
 }
 

@@ -87,6 +87,11 @@ TEST(WorkerProgram, AnExecutorWithoutASupervisorEndsAtOnce) {
   EXPECT_EQ(child->wait().how, "exit code 2");
 }
 
+TEST(WorkerProgram, ItsNameIsCheckedBeforeAnyServerIsAsked) {
+  const auto child = value_or_die(ChildProcess::start({LIGHTLOOM_WORKER, "--server", "x", "--name", "a b"}));
+  EXPECT_EQ(child->wait().how, "exit code 2");
+}
+
 TEST(WorkerProgram, SizesAreChecked) {
   const auto child = value_or_die(ChildProcess::start({LIGHTLOOM_WORKER, "--server", "x", "--memory", "8X"}));
   EXPECT_EQ(child->wait().how, "exit code 2");

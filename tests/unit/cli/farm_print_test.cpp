@@ -8,6 +8,7 @@
 namespace lightloom {
 namespace {
 
+using testing::EndsWith;
 using testing::HasSubstr;
 using testing::StartsWith;
 
@@ -26,6 +27,9 @@ TEST(FarmPrint, ARunningJobInALine) {
   job.running = 2;
   job.workers = 1;
   EXPECT_EQ(progress_line(job), "12 of 650 tasks, 2 running on 1 worker");
+  job.running = 0;
+  EXPECT_EQ(progress_line(job), "12 of 650 tasks, waiting for a worker") << "who worked on it may be gone";
+  job.running = 2;
   job.reused = 5;
   job.failed = 1;
   job.workers = 2;
@@ -38,10 +42,26 @@ TEST(FarmPrint, ARunningJobInALine) {
 TEST(FarmPrint, HowAJobEnded) {
   RemoteJob job = running_job();
   job.state = "done";
-  EXPECT_TRUE(how_it_ended(job).ok());
+  EXPECT_TRUE(how_it_ended(job, "farm:7000").ok());
   job.state = "failed";
   job.error = "level.glb is cut";
-  EXPECT_EQ(how_it_ended(job).message(), "job 7 ended failed: level.glb is cut; see lightloom events 7");
+  EXPECT_EQ(how_it_ended(job, "farm:7000").message(),
+            "job 7 ended failed: level.glb is cut; see lightloom events 7 --server farm:7000");
+}
+
+TEST(FarmPrint, AWorkerInALine) {
+  RemoteWorker worker;
+  worker.id = "anna-1";
+  worker.threads = 8;
+  worker.running = 2;
+  worker.silent_ms = 60'000;
+  EXPECT_THAT(worker_line(worker), StartsWith("anna-1 "));
+  EXPECT_THAT(worker_line(worker), HasSubstr("  2 of 8 threads busy, heard "));
+  worker.draining = true;
+  EXPECT_THAT(worker_line(worker), EndsWith(" ago, leaving"));
+  worker.silent_ms = 60'001;
+  EXPECT_THAT(worker_line(worker), HasSubstr("  gone, heard "));
+  EXPECT_THAT(worker_line(worker), EndsWith(" ago"));
 }
 
 TEST(Eta, IsSaidOnceSomethingWasDone) {
