@@ -3,11 +3,11 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
-#include <cstring>
 #include <mutex>
 #include <utility>
 
 #include "bake-server/store/folder_lock.h"
+#include "bake-server/store/packed_digests.h"
 #include "bake-server/store/sqlite_database.h"
 #include "bake-server/store/sqlite_schema.h"
 #include "bake-server/store/sqlite_upkeep.h"
@@ -21,22 +21,6 @@ namespace fs = std::filesystem;
 template <class Enum>
 int64_t number(Enum value) {
   return static_cast<int64_t>(value);
-}
-
-std::string pack(const std::vector<Digest>& digests) {
-  std::string bytes;
-  bytes.reserve(digests.size() * sizeof(Digest));
-  for (const Digest& digest : digests) bytes.append(digest.bytes.begin(), digest.bytes.end());
-  return bytes;
-}
-
-std::vector<Digest> unpack(std::string_view bytes) {
-  std::vector<Digest> digests(bytes.size() / sizeof(Digest));
-  for (Digest& digest : digests) {
-    std::memcpy(digest.bytes.data(), bytes.data(), sizeof(Digest));
-    bytes.remove_prefix(sizeof(Digest));
-  }
-  return digests;
 }
 
 /// Stored, and compared when a request comes again, maybe after an upgrade: never change what is hashed.

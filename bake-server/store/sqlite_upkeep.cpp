@@ -3,9 +3,9 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
-#include <cstring>
 #include <system_error>
 
+#include "bake-server/store/packed_digests.h"
 #include "bake-server/store/sqlite_schema.h"
 
 namespace lightloom {
@@ -13,15 +13,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Of rows that hold digests back to back in column 0.
+/// Of rows that hold packed digests in column 0.
 absl::Status visit_rows(Query rows, const VisitDigest& visit) {
   for (;;) {
     LL_ASSIGN_OR_RETURN(const bool row, rows.step());
     if (!row) return absl::OkStatus();
-    const std::string bytes = rows.bytes(0);
-    for (size_t at = 0; at + sizeof(Digest) <= bytes.size(); at += sizeof(Digest)) {
-      Digest digest;
-      std::memcpy(digest.bytes.data(), bytes.data() + at, sizeof(Digest));
+    for (const Digest& digest : unpack(rows.bytes(0))) {
       if (!visit(digest)) return absl::OkStatus();
     }
   }
