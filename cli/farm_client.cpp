@@ -4,12 +4,11 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cstdio>
 #include <cstdlib>
-#include <random>
 
 #include "core/asset/asset.h"
 #include "core/bake/task_runner.h"
+#include "core/base/random_id.h"
 #include "core/base/text.h"
 #include "core/base/version.h"
 #include "proto/client.h"
@@ -98,13 +97,6 @@ grpc::Status follow(v1::JobService::Stub* jobs, uint64_t id, uint64_t revision, 
   return status;
 }
 
-std::string new_request_id() {
-  std::random_device random;
-  char text[33];
-  std::snprintf(text, sizeof text, "%08x%08x%08x%08x", random(), random(), random(), random());
-  return text;
-}
-
 }  // namespace
 
 struct FarmClient::Connection {
@@ -165,7 +157,7 @@ absl::StatusOr<RemoteJob> FarmClient::submit(std::span<const uint8_t> scene, con
   const auto digest = connection_->blobs.upload(scene, progress);
   if (!digest.ok()) return in_words(digest.status());
 
-  return submit(new_request_id(), encode_payload({*digest, params}), {*digest}, name, priority);
+  return submit(random_id(), encode_payload({*digest, params}), {*digest}, name, priority);
 }
 
 absl::StatusOr<RemoteJob> FarmClient::submit(const std::string& request_id, std::span<const uint8_t> payload,

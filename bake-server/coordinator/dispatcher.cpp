@@ -1,7 +1,6 @@
 #include "bake-server/coordinator/dispatcher.h"
 
 #include <algorithm>
-#include <random>
 #include <utility>
 
 #include "core/bake/task_list.h"
@@ -23,16 +22,6 @@ SyncFacts facts_of(const SyncMessage& message) {
 }
 
 }  // namespace
-
-std::string random_token() {
-  static constexpr char kHex[] = "0123456789abcdef";
-  std::random_device random;
-  std::string out;
-  for (int i = 0; i < 4; ++i) {
-    for (uint32_t bits = random(), k = 0; k < 8; ++k, bits >>= 4) out += kHex[bits & 15];
-  }
-  return out;
-}
 
 void Dispatcher::hear(SyncMessage message, OnAnswer to, int64_t now_ms) {
   Worker& worker = workers_[message.worker];

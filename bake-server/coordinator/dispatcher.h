@@ -15,6 +15,7 @@
 #include "bake-server/scheduler/decide.h"
 #include "bake-server/scheduler/worker_session.h"
 #include "bake-server/store/store.h"
+#include "core/base/random_id.h"
 
 namespace lightloom {
 
@@ -67,14 +68,11 @@ struct WorkerStatus {
   bool draining = false;
 };
 
-/// Names an attempt: 128 random bits, in hexadecimal.
-std::string random_token();
-
 struct DispatchOptions {
   uint32_t lease_ms = 30'000;
-  uint32_t max_failures = 3;     ///< of a task, then it has failed for good
-  std::function<bool()> paused;  ///< gives out nothing while true; null: never
-  std::function<std::string()> new_token = random_token;
+  uint32_t max_failures = 3;                           ///< of a task, then it has failed for good
+  std::function<bool()> paused;                        ///< gives out nothing while true; null: never
+  std::function<std::string()> new_token = random_id;  ///< names an attempt
   DecideOptions decide;
 };
 
