@@ -19,9 +19,9 @@ class RemoteBlobs final : public BlobAccess {
     const ComputeGate::Pause pause(gate_);
     return client_.download(digest);
   }
-  absl::StatusOr<Digest> put(std::span<const uint8_t> bytes) override {
+  absl::Status put(const std::vector<std::vector<uint8_t>>& blobs) override {
     const ComputeGate::Pause pause(gate_);
-    return client_.upload(bytes);
+    return client_.upload(blobs);
   }
 
  private:

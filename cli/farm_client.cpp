@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
+#include <mutex>
 
 #include "core/asset/asset.h"
 #include "core/bake/task_runner.h"
@@ -270,6 +271,33 @@ absl::StatusOr<RemoteJob> FarmClient::watch(uint64_t id, const CancelFlag& cance
   }
 }
 
+absl::Status FarmClient::fetch_chunks(const ChunkStore& store, const std::vector<ChunkRef>& chunks,
+                                      const CancelFlag& cancel,
+                                      const std::function<void(uint64_t, uint64_t)>& progress) const {
+  constexpr int kAtOnce = 8;  // most of the time they wait, for the server or a disk
+  std::mutex mutex;
+  absl::Status first_error;
+  const auto failed = [&] {
+    const std::lock_guard lock(mutex);
+    return !first_error.ok();
+  };
+  const auto fetch_one = [&](const ChunkRef& chunk) -> absl::Status {
+    if (store.get(chunk).ok()) return absl::OkStatus();
+    const auto data = connection_->blobs.download(chunk.digest);
+    if (!data.ok()) return in_words(data.status());
+    return store.put(*data).status();
+  };
+  const bool done = parallel_for(chunks.size(), {kAtOnce, &cancel, progress}, [&](uint64_t i) {
+    if (failed()) return;
+    const absl::Status status = fetch_one(chunks[i]);
+    const std::lock_guard lock(mutex);
+    first_error.Update(status);
+  });
+  LL_RETURN_IF_ERROR(first_error);
+  if (done) return absl::OkStatus();
+  return absl::CancelledError("fetch cancelled; what is there is kept, so fetch goes on from here");
+}
+
 absl::StatusOr<Manifest> FarmClient::fetch(uint64_t id, const std::string& loom, const CancelFlag& cancel,
                                            const std::function<void(uint64_t, uint64_t)>& progress) {
   LL_ASSIGN_OR_RETURN(const RemoteJob job, this->job(id));
@@ -287,18 +315,7 @@ absl::StatusOr<Manifest> FarmClient::fetch(uint64_t id, const std::string& loom,
   for (const ProbeEntry& p : manifest.probes) chunks.push_back(p.relight);
   for (const CellEntry& c : manifest.cells) chunks.push_back(c.chunk);
   std::erase_if(chunks, [](const ChunkRef& c) { return c.size == 0; });
-  const ChunkStore store = chunk_store(loom);
-  uint64_t there = 0;
-  for (const ChunkRef& chunk : chunks) {
-    if (cancel.cancelled())
-      return absl::CancelledError("fetch cancelled; what is there is kept, so fetch goes on from here");
-    if (!store.get(chunk).ok()) {
-      const auto data = connection_->blobs.download(chunk.digest);
-      if (!data.ok()) return in_words(data.status());
-      LL_RETURN_IF_ERROR(store.put(*data).status());
-    }
-    progress(++there, chunks.size());
-  }
+  LL_RETURN_IF_ERROR(fetch_chunks(chunk_store(loom), chunks, cancel, progress));
   LL_RETURN_IF_ERROR(write_manifest(loom, manifest));
   return manifest;
 }

@@ -19,6 +19,8 @@ class Channel;
 
 namespace lightloom {
 
+class ChunkStore;
+
 struct RemoteJob {
   uint64_t id = 0;
   std::string name, client;
@@ -82,6 +84,8 @@ class FarmClient {
 
  private:
   struct Connection;
+  absl::Status fetch_chunks(const ChunkStore& store, const std::vector<ChunkRef>& chunks, const CancelFlag& cancel,
+                            const std::function<void(uint64_t, uint64_t)>& progress) const;
   absl::Status in_words(const absl::Status& status) const;
 
   std::string server_;

@@ -47,6 +47,8 @@ class BlobClient {
   /// Sends the blob if the server lacks it; an upload that was cut goes on. `progress`: bytes that are there.
   absl::StatusOr<Digest> upload(std::span<const uint8_t> bytes,
                                 const std::function<void(uint64_t)>& progress = nullptr) const;
+  /// Sends all of these, small ones together.
+  absl::Status upload(const std::vector<std::vector<uint8_t>>& blobs) const;
   /// The blob, its digest checked. NotFound.
   absl::StatusOr<std::vector<uint8_t>> download(const Digest& digest) const;
 

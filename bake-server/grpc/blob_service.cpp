@@ -11,7 +11,7 @@ namespace {
 constexpr uint64_t kPiece = uint64_t{1} << 20;
 constexpr int kMostDigests = 8192;
 
-/// Takes an upload piece by piece; what arrived before a cut is kept.
+/// Takes blobs piece by piece; what arrived before a cut is kept.
 class Writing final : public grpc::ServerReadReactor<v1::WriteRequest> {
  public:
   Writing(BlobStore* store, v1::WriteResponse* response) : store_(store), response_(response) {
@@ -22,8 +22,7 @@ class Writing final : public grpc::ServerReadReactor<v1::WriteRequest> {
   void OnReadDone(bool ok) override {
     const auto lock = hand_over_.hold();
     if (!ok) {
-      if (!status_) status_ = absl::InvalidArgumentError("an upload must begin with the blob's name");
-      response_->set_size(offset_);
+      if (!status_) status_ = absl::InvalidArgumentError("a blob must begin with its name");
       Finish(to_grpc(*status_));
       return;
     }
@@ -41,19 +40,22 @@ class Writing final : public grpc::ServerReadReactor<v1::WriteRequest> {
  private:
   absl::Status take() {
     if (piece_.data().size() > kPiece) return absl::InvalidArgumentError("a piece of a blob must be at most 1 MiB");
-    if (!status_) {
+    if (!piece_.digest().empty()) {
+      if (status_ && !status_->ok()) return absl::InvalidArgumentError("a blob must not begin before the last one's end");
       LL_ASSIGN_OR_RETURN(digest_, to_digest(piece_.digest()));
       size_ = piece_.size();
       offset_ = piece_.offset();
-    } else if (!piece_.digest().empty()) {
-      return absl::InvalidArgumentError("an upload is of one blob only");
+      status_ = absl::DataLossError("the upload ended before its last byte; go on where it ended");
+    } else if (!status_ || offset_ == size_) {
+      return absl::InvalidArgumentError("a blob must begin with its name");
     }
     const auto* data = reinterpret_cast<const uint8_t*>(piece_.data().data());
     LL_RETURN_IF_ERROR(store_->append(digest_, size_, offset_, {data, piece_.data().size()}));
     offset_ += piece_.data().size();
-    status_ = offset_ == size_ || store_->has(digest_)
-                  ? absl::OkStatus()
-                  : absl::DataLossError("the upload ended before its last byte; go on where it ended");
+    if (!status_->ok() && (offset_ == size_ || store_->has(digest_))) {
+      status_ = absl::OkStatus();
+      response_->set_blobs(response_->blobs() + 1);
+    }
     return absl::OkStatus();
   }
 

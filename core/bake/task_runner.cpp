@@ -13,10 +13,38 @@ namespace {
 
 bool cancelled(const BakeControl& control) { return control.cancel != nullptr && control.cancel->cancelled(); }
 
+/// What a task made, on its way to storage: little by little would cost a message each.
+class Outgoing {
+ public:
+  explicit Outgoing(BlobAccess* blobs) : blobs_(*blobs) {}
+
+  absl::StatusOr<ChunkRef> add(std::span<const uint8_t> bytes) {
+    waiting_.emplace_back(bytes.begin(), bytes.end());
+    waiting_bytes_ += bytes.size();
+    if (waiting_bytes_ > kMostWaiting) LL_RETURN_IF_ERROR(send());
+    return ChunkRef{sha256(bytes), bytes.size()};
+  }
+  absl::Status send() {
+    if (waiting_.empty()) return absl::OkStatus();
+    LL_RETURN_IF_ERROR(blobs_.put(waiting_));
+    waiting_.clear();
+    waiting_bytes_ = 0;
+    return absl::OkStatus();
+  }
+
+ private:
+  static constexpr uint64_t kMostWaiting = uint64_t{4} << 20;
+
+  BlobAccess& blobs_;
+  std::vector<std::vector<uint8_t>> waiting_;
+  uint64_t waiting_bytes_ = 0;
+};
+
 /// What a task works with.
 struct Context {
   const BakeSession& session;
   BlobAccess& blobs;
+  Outgoing& outgoing;
   const BakeTask& task;
   TaskArgument argument;
   const BakeControl& control;
@@ -25,10 +53,11 @@ struct Context {
     if (control.progress) control.progress(task.kind, done, total, rays);
   }
   ChunkSink sink() const {
-    return [this](std::span<const uint8_t> bytes) -> absl::StatusOr<ChunkRef> {
-      LL_ASSIGN_OR_RETURN(const Digest digest, blobs.put(bytes));
-      return ChunkRef{digest, bytes.size()};
-    };
+    return [this](std::span<const uint8_t> bytes) { return outgoing.add(bytes); };
+  }
+  absl::StatusOr<Digest> put(std::span<const uint8_t> bytes) const {
+    LL_ASSIGN_OR_RETURN(const ChunkRef ref, outgoing.add(bytes));
+    return ref.digest;
   }
 };
 
@@ -48,7 +77,7 @@ absl::StatusOr<std::vector<uint8_t>> fetch(BlobAccess* blobs, const Digest& dige
 /// Stores the list of chunks; outputs are it and them.
 absl::StatusOr<TaskOutput> chunk_outputs(const Context& c, const std::vector<ChunkRef>& refs) {
   TaskOutput out;
-  LL_ASSIGN_OR_RETURN(const Digest list, c.blobs.put(encode_chunk_refs(refs)));
+  LL_ASSIGN_OR_RETURN(const Digest list, c.put(encode_chunk_refs(refs)));
   out.outputs.push_back(list);
   for (const ChunkRef& ref : refs) {
     if (ref.size > 0) out.outputs.push_back(ref.digest);
@@ -65,7 +94,7 @@ absl::StatusOr<TaskOutput> run_plan(const Context& c) {
   summary.probes = static_cast<uint32_t>(plan.placement.probes.size());
   summary.objects = static_cast<uint32_t>(c.session.scene().objects.size());
   TaskOutput out;
-  LL_ASSIGN_OR_RETURN(const Digest blob, c.blobs.put(encode_plan_summary(summary)));
+  LL_ASSIGN_OR_RETURN(const Digest blob, c.put(encode_plan_summary(summary)));
   out.outputs.push_back(blob);
 
   // Cells in the octree's order: neighbours share what a worker remembers.
@@ -88,7 +117,7 @@ absl::StatusOr<TaskOutput> run_warm(const Context&) { return TaskOutput(); }
 absl::StatusOr<TaskOutput> run_cell(const Context& c) {
   LL_ASSIGN_OR_RETURN(const BakedCell cell, c.session.cell(c.argument.first, c.sink(), c.control.cancel));
   TaskOutput out;
-  LL_ASSIGN_OR_RETURN(const Digest record, c.blobs.put(encode_cell_record(cell.record)));
+  LL_ASSIGN_OR_RETURN(const Digest record, c.put(encode_cell_record(cell.record)));
   out.outputs = {record, cell.record.chunk.digest};
   out.rays = cell.record.gather_rays + cell.visibility_rays;
   return out;
@@ -201,7 +230,7 @@ absl::StatusOr<TaskOutput> run_assemble(const Context& c) {
   }
   LL_ASSIGN_OR_RETURN(const Manifest manifest, assembly.finish());
   TaskOutput out;
-  LL_ASSIGN_OR_RETURN(const Digest blob, c.blobs.put(encode_manifest(manifest)));
+  LL_ASSIGN_OR_RETURN(const Digest blob, c.put(encode_manifest(manifest)));
   out.outputs.push_back(blob);
   return out;
 }
@@ -262,7 +291,10 @@ absl::StatusOr<TaskOutput> TaskRunner::run(const BakeTask& task, const BakeContr
   LL_ASSIGN_OR_RETURN(const auto session, session_of(task, control));
   trim();
   LL_ASSIGN_OR_RETURN(const TaskArgument argument, argument_of(task, *session));
-  return kind->run({*session, blobs_, task, argument, control});
+  Outgoing outgoing(&blobs_);
+  LL_ASSIGN_OR_RETURN(TaskOutput output, kind->run({*session, blobs_, outgoing, task, argument, control}));
+  LL_RETURN_IF_ERROR(outgoing.send());
+  return output;
 }
 
 absl::StatusOr<std::shared_ptr<const BakeSession>> TaskRunner::session_of(const BakeTask& task,

@@ -29,8 +29,8 @@ class BlobAccess {
   virtual ~BlobAccess() = default;
   /// NotFound if there is none.
   virtual absl::StatusOr<std::vector<uint8_t>> get(const Digest& digest) = 0;
-  /// Returns the bytes' SHA-256.
-  virtual absl::StatusOr<Digest> put(std::span<const uint8_t> bytes) = 0;
+  /// All of them, or an error. Their names are their SHA-256.
+  virtual absl::Status put(const std::vector<std::vector<uint8_t>>& blobs) = 0;
 };
 
 struct BakeTask {

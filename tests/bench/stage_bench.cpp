@@ -25,10 +25,9 @@ T or_exit(absl::StatusOr<T> value) {
 class MemoryBlobs final : public BlobAccess {
  public:
   absl::StatusOr<std::vector<uint8_t>> get(const Digest& digest) override { return blobs_.at(digest); }
-  absl::StatusOr<Digest> put(std::span<const uint8_t> bytes) override {
-    const Digest digest = sha256(bytes);
-    blobs_[digest].assign(bytes.begin(), bytes.end());
-    return digest;
+  absl::Status put(const std::vector<std::vector<uint8_t>>& many) override {
+    for (const std::vector<uint8_t>& bytes : many) blobs_[sha256(bytes)] = bytes;
+    return absl::OkStatus();
   }
 
  private:
@@ -46,8 +45,9 @@ int run(int argc, char** argv) {
   params.spacing = static_cast<float>(std::atof(argv[4]));
   const int64_t mine = std::atoi(argv[5]), of = std::atoi(argv[6]);
   MemoryBlobs blobs;
-  const Digest level = or_exit(blobs.put(or_exit(read_file(argv[1]))));
-  const std::vector<uint8_t> payload = encode_payload({level, params});
+  const std::vector<uint8_t> level = or_exit(read_file(argv[1]));
+  (void)blobs.put({level});
+  const std::vector<uint8_t> payload = encode_payload({sha256(level), params});
   TaskRunner runner(&blobs);
   BakeControl control;
   control.threads = 1;

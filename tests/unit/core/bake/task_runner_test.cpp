@@ -31,15 +31,20 @@ class MapBlobs : public BlobAccess {
     if (it == blobs.end()) return absl::NotFoundError("there is no such blob");
     return it->second;
   }
-  absl::StatusOr<Digest> put(std::span<const uint8_t> bytes) override {
-    const Digest digest = sha256(bytes);
+  absl::Status put(const std::vector<std::vector<uint8_t>>& many) override {
     const std::lock_guard lock(mutex_);
-    blobs[digest] = {bytes.begin(), bytes.end()};
-    return digest;
+    for (const std::vector<uint8_t>& bytes : many) blobs[sha256(bytes)] = bytes;
+    ++puts;
+    return absl::OkStatus();
+  }
+  Digest put_one(const std::vector<uint8_t>& bytes) {
+    EXPECT_TRUE(put({bytes}).ok());
+    return sha256(bytes);
   }
 
   std::map<Digest, std::vector<uint8_t>> blobs;
   std::map<Digest, int> gets;
+  int puts = 0;
 
  private:
   std::mutex mutex_;
@@ -61,7 +66,7 @@ class TaskRunnerTest : public ::testing::Test {
   TaskRunnerTest() {
     EXPECT_TRUE(save_gltf(value_or_die(builtin_scene("cornell")), folder_.path() / "cornell.glb").ok());
     glb_ = value_or_die(read_file(folder_.path() / "cornell.glb"));
-    scene_ = value_or_die(blobs_.put(glb_));
+    scene_ = blobs_.put_one(glb_);
   }
 
   BakeTask task(const SpawnedTask& spawned, const BakeParams& params = small()) const {
@@ -119,7 +124,7 @@ TEST_F(TaskRunnerTest, ShuffledOverTwoRunnersIsTheBakeByteForByte) {
   }));
   EXPECT_EQ(blobs_.gets[scene_], 2) << "each runner plans once";
 
-  inputs_ = value_or_die(blobs_.put(encode_task_list(finished)));
+  inputs_ = blobs_.put_one(encode_task_list(finished));
   const TaskOutput assembled = value_or_die(other.run(task(last)));
   ASSERT_EQ(assembled.outputs.size(), 1u);
   const auto manifest_bytes = value_or_die(blobs_.get(assembled.outputs.front()));
@@ -134,6 +139,15 @@ TEST_F(TaskRunnerTest, ShuffledOverTwoRunnersIsTheBakeByteForByte) {
   for (const ChunkRef& ref : chunks) {
     if (ref.size == 0) continue;
     EXPECT_EQ(value_or_die(blobs_.get(ref.digest)), value_or_die(store.get(ref)));
+  }
+}
+
+TEST_F(TaskRunnerTest, WhatATaskMakesGoesOutTogether) {
+  const TaskOutput planned = plan();
+  for (const char* kind : {"cell", "relight", "surfaces"}) {
+    blobs_.puts = 0;
+    EXPECT_GT(value_or_die(runner_.run(task(find(planned, kind)))).outputs.size(), 1u);
+    EXPECT_EQ(blobs_.puts, 1) << kind;
   }
 }
 
@@ -230,7 +244,7 @@ TEST_F(TaskRunnerTest, RefusesWhatItCannotRun) {
   EXPECT_THAT(error({"plan", {1, 2, 3}, {}, {}}, kInvalidArgument), HasSubstr("payload is corrupt"));
   EXPECT_THAT(error({"plan", encode_payload({sha256("no"), small()}), {}, {}}, kNotFound),
               HasSubstr("the level, blob " + sha256("no").hex()));
-  const Digest garbage = value_or_die(blobs_.put(std::vector<uint8_t>(64, 'x')));
+  const Digest garbage = blobs_.put_one(std::vector<uint8_t>(64, 'x'));
   EXPECT_THAT(error({"plan", encode_payload({garbage, small()}), {}, {}}, kInvalidArgument), HasSubstr("level.glb"));
   blobs_.blobs[sha256("other")] = glb_;
   EXPECT_THAT(error({"plan", encode_payload({sha256("other"), small()}), {}, {}}, kDataLoss),
@@ -256,7 +270,7 @@ TEST_F(TaskRunnerTest, AssembleRefusesListsThatDoNotFit) {
   };
   const FinishedTask cell_0 = run(cell), relight_0 = run(relight);
   const auto assemble = [&](const std::vector<FinishedTask>& list, absl::StatusCode code) {
-    inputs_ = value_or_die(blobs_.put(encode_task_list(list)));
+    inputs_ = blobs_.put_one(encode_task_list(list));
     return error(task(last), code);
   };
   EXPECT_THAT(error(task(last), kNotFound), HasSubstr("the task list"));
