@@ -96,10 +96,11 @@ class Tasks {
   std::map<uint64_t, std::shared_ptr<CancelFlag>> cancels_;
 };
 
+/// Of what can be written to, so neither libraries nor what allocators and stacks may grow into count.
 void limit_memory(uint64_t bytes) {
   if (bytes == 0) return;
   const rlimit limit{bytes, bytes};
-  ::setrlimit(RLIMIT_AS, &limit);
+  ::setrlimit(RLIMIT_DATA, &limit);
 }
 
 }  // namespace

@@ -15,7 +15,7 @@ struct ExecutorConfig {
   std::string server;         ///< HOST:PORT, for blobs
   uint32_t threads = 1;       ///< tasks that compute at once
   uint64_t cache_bytes = 0;   ///< levels that are kept warm
-  uint64_t memory_bytes = 0;  ///< of address space; 0: no limit
+  uint64_t memory_bytes = 0;  ///< that it may write to; 0: no limit
 };
 
 /// Serves the supervisor that started this process (ChildExecutor) with what `make` gives, and ends the process when the

@@ -34,6 +34,14 @@ CLI::Option* add_size(CLI::App* app, const char* name, uint64_t* bytes, const ch
   return app->add_option_function<std::string>(name, parse, help)->type_name("SIZE");
 }
 
+/// Below this the program itself, its threads and libraries, has not enough to go on or to fail in good order.
+void check_memory(const lightloom::ExecutorConfig& config) {
+  const uint64_t least = (uint64_t{512} << 20) + config.threads * (uint64_t{32} << 20);
+  if (config.memory_bytes == 0 || config.memory_bytes >= least) return;
+  throw CLI::ValidationError("--memory", "must be at least " + lightloom::size_text(least) + " with " +
+                                             std::to_string(config.threads) + " threads, or 0 for no limit");
+}
+
 /// Takes no more tasks at the first signal, hands back what runs at the second.
 void stop_on_signals(lightloom::StopSignal* signals, lightloom::Worker* worker) {
   std::thread([signals, worker] {
@@ -70,13 +78,14 @@ int main(int argc, char** argv) {
         return std::string(lightloom::is_worker_name(text) ? "" : lightloom::kWorkerNameRule);
       });
   add_size(&app, "--cache", &config.cache_bytes, "memory for levels that are kept warm [a quarter of the memory]");
-  add_size(&app, "--memory", &config.memory_bytes, "address space that tasks may use, like 8G [0: no limit]");
+  add_size(&app, "--memory", &config.memory_bytes, "memory that tasks may use, like 8G [0: no limit]");
   app.add_option("--timeout", timeout, "seconds to wait for the server at the start")
       ->check(CLI::Range(1, 3600))
       ->capture_default_str();
   app.set_version_flag("--version", std::string(lightloom::kVersion));
   try {
     app.parse(argc, argv);
+    check_memory(config);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
   }

@@ -156,8 +156,7 @@ absl::StatusOr<JobStatus> Coordinator::submit(const NewJob& new_job) {
   for (const Digest& input : new_job.inputs) {
     if (!blobs_->has(input)) return absl::NotFoundError("blob " + input.hex() + " is not here; upload it first");
   }
-  if (options_.check_submit) LL_RETURN_IF_ERROR(options_.check_submit(new_job));
-  LL_ASSIGN_OR_RETURN(Job job, store_->submit(new_job, clock_()));
+  LL_ASSIGN_OR_RETURN(Job job, store_->submit(new_job, clock_(), options_.check_submit));
   wake();
   return status_of(std::move(job));
 }

@@ -26,7 +26,7 @@ struct CoordinatorOptions {
   uint32_t tick_ms = 100;   ///< how often leases and watchers are looked at
   bool keep_leases = true;  ///< of an earlier process on this state; false: its workers died with it
   DispatchOptions dispatch;
-  std::function<absl::Status(const NewJob&)> check_submit;  ///< may refuse a job; null: never
+  AdmitJob check_submit;  ///< null: refuses none
 };
 
 /// Thread-safe. The store and the blobs must outlive it.

@@ -125,7 +125,7 @@ class SqliteStore final : public Store {
     return transaction.commit();
   }
 
-  absl::StatusOr<Job> submit(const NewJob& job, int64_t now_ms) override {
+  absl::StatusOr<Job> submit(const NewJob& job, int64_t now_ms, const AdmitJob& admit) override {
     LL_RETURN_IF_ERROR(check_job(job));
     const std::string content = content_of(job);
     const std::lock_guard guard(mutex_);
@@ -142,6 +142,7 @@ class SqliteStore final : public Store {
       }
       if (there) return read_job(same.integer(0));
     }
+    if (admit) LL_RETURN_IF_ERROR(admit(job));
 
     const std::string work = pack({work_of(job)});
     LL_RETURN_IF_ERROR(

@@ -161,6 +161,9 @@ struct Forgotten {
   bool more = false;  ///< the limit came first: call again
 };
 
+/// May refuse a job that is about to be made.
+using AdmitJob = std::function<absl::Status(const NewJob&)>;
+
 /// Returns false to be called no more.
 using VisitDigest = std::function<bool(const Digest&)>;
 
@@ -180,11 +183,12 @@ class Store {
   virtual absl::Status group(const std::function<absl::Status()>& calls) = 0;
 
   /// The job as it is now. The same request again (client, request_id) returns the job that is there; AlreadyExists if
-  /// it asked for something else. InvalidArgument beyond the limits above.
+  /// it asked for something else. InvalidArgument beyond the limits above. `admit`, if any, may refuse a job that is not
+  /// there yet.
   /// Tasks of a stage that opens, here or later, that an earlier job of any client has done are done at once, with what
   /// they spawned: equal are kind, stage and argument, of jobs with equal payload, inputs and tasks. Not those that
   /// raised the alarm (kMismatch), nor those whose outputs are no longer there.
-  virtual absl::StatusOr<Job> submit(const NewJob& job, int64_t now_ms) = 0;
+  virtual absl::StatusOr<Job> submit(const NewJob& job, int64_t now_ms, const AdmitJob& admit = nullptr) = 0;
   /// Idempotent; an ended job stays as it ended. All its attempts end. NotFound if there is no such job.
   virtual absl::Status cancel(JobId job, int64_t now_ms) = 0;
   /// Idempotent. NotFound if there is no such job.

@@ -106,7 +106,9 @@ absl::StatusOr<TaskOutput> run_plan(const Context& c) {
   for (uint32_t i = 0; i < summary.probes; i += kRelightProbes) {
     spawn("relight", 1, i, std::min(kRelightProbes, summary.probes - i));
   }
-  spawn("surfaces", 1, 0, summary.objects);
+  for (uint32_t i = 0; i < summary.objects; i += kSurfaceObjects) {
+    spawn("surfaces", 1, i, std::min(kSurfaceObjects, summary.objects - i));
+  }
   spawn("assemble", 2, 0, 0);
   return out;
 }

@@ -4,7 +4,7 @@
 //   plan        0    empty             PlanSummary      -              asks for all other tasks
 //   cell        1    one planned cell  CellRecord       its chunk
 //   relight     1    probes            chunk refs       one per probe
-//   surfaces    1    all objects       chunk refs       one per object that has receivers
+//   surfaces    1    objects           chunk refs       one per object that has receivers
 //   assemble    2    -                 the manifest     -
 //   warm        -    empty             -                -              nobody asks for it: makes the session
 #pragma once
@@ -54,8 +54,8 @@ struct TaskOutput {
   uint64_t rays = 0;  ///< shot this time: fewer by a worker that remembers more
 };
 
-/// Probes of one "relight" task.
-inline constexpr uint32_t kRelightProbes = 16;
+/// Probes of one "relight" task, and objects of one "surfaces" task.
+inline constexpr uint32_t kRelightProbes = 16, kSurfaceObjects = 1024;
 
 /// The job's first task; it asks for the others.
 SpawnedTask first_task();

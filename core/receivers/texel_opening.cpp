@@ -10,6 +10,8 @@
 namespace lightloom {
 namespace {
 
+constexpr float kLongest = 1e6f;  // metres: no level has texels of this size
+
 /// The surface at the middle of part i, pushed off, if the surface goes that far.
 std::optional<ShadingPoint> part_middle(const Object& object, const LightmapUv& uv, const TexelGrid& grid,
                                         const Texel& texel, bool back, int i) {
@@ -82,6 +84,8 @@ bool TexelOpening::anything_stands_on_it() const {
   const float det = d1.x * d2.y - d1.y * d2.x;
   if (det == 0) return false;
   const Vec3 across = (e1 * d2.y - e2 * d1.y) / det, up = (e2 * d1.x - e1 * d2.x) / det;  // ∂p/∂x, ∂p/∂y, per texel
+  // A chart squeezed to almost nothing has texels without end: there, too, the parts decide.
+  if (!(dot(across, across) + dot(up, up) < kLongest * kLongest)) return true;
   const ShadingPoint s = lifted({texel.triangle, texel.b1, texel.b2});
   const Vec2 point = c[0] + d1 * texel.b1 + d2 * texel.b2;
   const Vec3 corner =

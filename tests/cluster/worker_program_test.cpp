@@ -93,8 +93,11 @@ TEST(WorkerProgram, ItsNameIsCheckedBeforeAnyServerIsAsked) {
 }
 
 TEST(WorkerProgram, SizesAreChecked) {
-  const auto child = value_or_die(ChildProcess::start({LIGHTLOOM_WORKER, "--server", "x", "--memory", "8X"}));
-  EXPECT_EQ(child->wait().how, "exit code 2");
+  for (const char* memory : {"8X", "100M", "575M"}) {
+    const auto child =
+        value_or_die(ChildProcess::start({LIGHTLOOM_WORKER, "--server", "x", "--threads", "2", "--memory", memory}));
+    EXPECT_EQ(child->wait().how, "exit code 2") << memory;
+  }
 }
 
 }  // namespace

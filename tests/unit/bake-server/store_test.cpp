@@ -120,6 +120,15 @@ TEST_P(StoreContract, TheSameRequestIsTheSameJob) {
   EXPECT_THAT(history(first), ElementsAre("submitted"));
 }
 
+TEST_P(StoreContract, AJobMayBeRefusedUnlessItIsThere) {
+  const NewJob request = new_job("r", {cell(0, 0)});
+  const AdmitJob refuse = [](const NewJob& job) { return absl::ResourceExhaustedError("no " + job.request_id); };
+  EXPECT_EQ(store_->submit(request, 1, refuse).status(), absl::ResourceExhaustedError("no r"));
+  EXPECT_THAT(value(store_->jobs(0, 10)), IsEmpty());
+  const JobId first = submit(request);
+  EXPECT_EQ(value(store_->submit(request, 2, refuse)).id, first);
+}
+
 TEST_P(StoreContract, TheSameRequestIdForSomethingElseIsRefused) {
   const NewJob request = new_job("r", {cell(0, 0)});
   submit(request);

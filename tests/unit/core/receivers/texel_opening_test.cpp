@@ -80,5 +80,27 @@ TEST_F(CrateRoom, WallsCountWhole) {
   }
 }
 
+// Found by fuzzing: such texels are longer than numbers go, and rays along them are none.
+TEST(TexelOpening, ChartsSqueezedToAlmostNothing) {
+  for (const float height : {1e-6f, 1e-20f, 1e-36f, 1e-44f}) {
+    const Scene scene = test::facing_plates(1, 1);
+    const Object& plate = scene.objects[test::object_named(scene, "target")];
+    LightmapUv uv;
+    uv.width = uv.height = 4;
+    for (const Triangle& t : plate.triangles) {
+      auto& corners = uv.corners.emplace_back();
+      for (size_t k = 0; k < 3; ++k) corners[k] = {4 * plate.uv1[t.v[k]].x, height * plate.uv1[t.v[k]].y};
+    }
+    const auto tracer = RayTracer::create(scene);
+    ASSERT_TRUE(tracer.ok());
+    const TexelGrid grid = rasterise(plate, uv);
+    for (const Texel& texel : grid.texels) {
+      const TexelOpening opening(**tracer, plate, uv, grid, texel, false, 7);
+      EXPECT_TRUE(is_finite(opening.middle().position)) << height;
+    }
+    EXPECT_FALSE(grid.texels.empty()) << height;
+  }
+}
+
 }  // namespace
 }  // namespace lightloom
