@@ -68,7 +68,8 @@ TEST_F(BlobServiceTest, ManyAreSentTogether) {
 }
 
 TEST_F(BlobServiceTest, OneCallTakesOneBlobAfterTheOther) {
-  EXPECT_TRUE(write({first_piece("one blob", "one "), piece("blob"), first_piece("another", "another")}, &response_).ok());
+  EXPECT_TRUE(
+      write({first_piece("one blob", "one "), piece("blob"), first_piece("another", "another")}, &response_).ok());
   EXPECT_EQ(response_.blobs(), 2u);
   EXPECT_TRUE(there("one blob"));
   EXPECT_TRUE(there("another"));
