@@ -41,7 +41,8 @@ class Writing final : public grpc::ServerReadReactor<v1::WriteRequest> {
   absl::Status take() {
     if (piece_.data().size() > kPiece) return absl::InvalidArgumentError("a piece of a blob must be at most 1 MiB");
     if (!piece_.digest().empty()) {
-      if (status_ && !status_->ok()) return absl::InvalidArgumentError("a blob must not begin before the last one's end");
+      if (status_ && !status_->ok())
+        return absl::InvalidArgumentError("a blob must not begin before the last one's end");
       LL_ASSIGN_OR_RETURN(digest_, to_digest(piece_.digest()));
       size_ = piece_.size();
       offset_ = piece_.offset();
