@@ -117,34 +117,36 @@ absl::StatusOr<Digest> BlobClient::upload(std::span<const uint8_t> bytes,
 }
 
 absl::Status BlobClient::upload(const std::vector<std::vector<uint8_t>>& blobs) const {
-  std::vector<v1::WriteRequest> small;
+  if (upload_together(blobs)) return absl::OkStatus();
+  // Too big, or cut, or some are there in part: one after the other, each from where it is.
+  for (const std::vector<uint8_t>& blob : blobs) LL_RETURN_IF_ERROR(upload(std::span(blob)).status());
+  return absl::OkStatus();
+}
+
+bool BlobClient::upload_together(const std::vector<std::vector<uint8_t>>& blobs) const {
   uint64_t bytes = 0;
   for (const std::vector<uint8_t>& blob : blobs) {
-    if (blob.size() > kPiece) {
-      LL_RETURN_IF_ERROR(upload(std::span(blob)).status());
-      continue;
-    }
-    v1::WriteRequest& whole = small.emplace_back();
+    if (blob.size() > kPiece) return false;
+    bytes += blob.size();
+  }
+  if (blobs.empty()) return true;
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + patience_.call + std::chrono::seconds(bytes >> 20));
+  context.set_initial_metadata_corked(true);  // goes out with the first piece
+  v1::WriteResponse response;
+  const auto stub = v1::BlobService::NewStub(channel_);
+  const auto writer = stub->Write(&context, &response);
+  for (const std::vector<uint8_t>& blob : blobs) {
+    v1::WriteRequest whole;
     whole.set_digest(to_bytes(sha256(blob)));
     whole.set_size(blob.size());
     whole.set_data(blob.data(), blob.size());
-    bytes += blob.size();
+    grpc::WriteOptions options;
+    if (&blob == &blobs.back()) options.set_last_message();
+    if (patience_.give_up && patience_.give_up()) context.TryCancel();
+    if (!writer->Write(whole, options)) break;
   }
-  if (small.empty()) return absl::OkStatus();
-  Patience patience = patience_;
-  patience.call += std::chrono::seconds(bytes >> 20);
-  const auto stub = v1::BlobService::NewStub(channel_);
-  return call_with_retries(patience, [&](grpc::ClientContext* context) {
-    context->set_initial_metadata_corked(true);  // goes out with the first piece
-    v1::WriteResponse response;
-    const auto writer = stub->Write(context, &response);
-    for (const v1::WriteRequest& whole : small) {
-      grpc::WriteOptions options;
-      if (&whole == &small.back()) options.set_last_message();
-      if (!writer->Write(whole, options)) break;
-    }
-    return writer->Finish();
-  });
+  return writer->Finish().ok();
 }
 
 absl::StatusOr<std::vector<uint8_t>> BlobClient::download(const Digest& digest) const {

@@ -47,12 +47,14 @@ class BlobClient {
   /// Sends the blob if the server lacks it; an upload that was cut goes on. `progress`: bytes that are there.
   absl::StatusOr<Digest> upload(std::span<const uint8_t> bytes,
                                 const std::function<void(uint64_t)>& progress = nullptr) const;
-  /// Sends all of these, small ones together.
+  /// Sends all of these: in one call, if none is large.
   absl::Status upload(const std::vector<std::vector<uint8_t>>& blobs) const;
   /// The blob, its digest checked. NotFound.
   absl::StatusOr<std::vector<uint8_t>> download(const Digest& digest) const;
 
  private:
+  bool upload_together(const std::vector<std::vector<uint8_t>>& blobs) const;
+
   std::shared_ptr<grpc::Channel> channel_;
   Patience patience_;
 };

@@ -67,6 +67,14 @@ TEST_F(BlobServiceTest, ManyAreSentTogether) {
   for (const Bytes& blob : blobs) EXPECT_EQ(value_or_die(client_.download(sha256(blob))), blob);
 }
 
+TEST_F(BlobServiceTest, ManyGoOnWhereOneOfThemWasCut) {
+  const std::string cut = "cut short by a server that was killed";
+  EXPECT_EQ(write({first_piece(cut, "cut short")}, &response_).error_code(), grpc::StatusCode::DATA_LOSS);
+  const auto blob = [](const std::string& s) { return Bytes(s.begin(), s.end()); };
+  ASSERT_TRUE(client_.upload({blob("before"), blob(cut), blob("after")}).ok());
+  for (const std::string& s : {std::string("before"), cut, std::string("after")}) EXPECT_TRUE(there(s)) << s;
+}
+
 TEST_F(BlobServiceTest, OneCallTakesOneBlobAfterTheOther) {
   EXPECT_TRUE(
       write({first_piece("one blob", "one "), piece("blob"), first_piece("another", "another")}, &response_).ok());
