@@ -34,7 +34,10 @@ class RemoteBlobs final : public BlobAccess {
 LocalExecutor::LocalExecutor(std::shared_ptr<grpc::Channel> channel, uint32_t threads, uint64_t cache_bytes)
     : gate_(threads),
       blobs_(std::make_unique<RemoteBlobs>(std::move(channel), &gate_)),
-      runner_(blobs_.get(), cache_bytes) {}
+      runner_(blobs_.get(), cache_bytes, [this](const std::function<void()>& wait) {
+        const ComputeGate::Pause pause(&gate_);
+        wait();
+      }) {}
 
 absl::StatusOr<TaskOutput> LocalExecutor::run(const BakeTask& task, const BakeControl& control) {
   const ComputeGate::Slot slot(&gate_);

@@ -278,7 +278,10 @@ struct TaskRunner::Warm {
 
 SpawnedTask first_task() { return {"plan", 0, {}, 0}; }
 
-TaskRunner::TaskRunner(BlobAccess* blobs, uint64_t cache_bytes) : blobs_(*blobs), cache_bytes_(cache_bytes) {}
+TaskRunner::TaskRunner(BlobAccess* blobs, uint64_t cache_bytes, Aside aside)
+    : blobs_(*blobs),
+      cache_bytes_(cache_bytes),
+      aside_(aside ? std::move(aside) : [](const std::function<void()>& wait) { wait(); }) {}
 
 TaskRunner::~TaskRunner() = default;
 
@@ -311,7 +314,14 @@ absl::StatusOr<std::shared_ptr<const BakeSession>> TaskRunner::session_of(const 
   for (auto at = place(); at != warm_.end(); at = place()) {
     std::rotate(warm_.begin(), at, at + 1);
     if (warm_.front()->session != nullptr) return warm_.front()->session;
-    made_.wait_for(lock, std::chrono::milliseconds(50));
+    lock.unlock();
+    aside_([&] {
+      std::unique_lock waiting(mutex_);
+      for (auto w = place(); w != warm_.end() && (*w)->session == nullptr && !cancelled(control); w = place()) {
+        made_.wait_for(waiting, std::chrono::milliseconds(50));
+      }
+    });
+    lock.lock();
     if (cancelled(control)) return absl::CancelledError("task '" + task.kind + "' cancelled");
   }
   const auto warm = std::make_shared<Warm>(Warm{payload, nullptr});

@@ -10,6 +10,7 @@
 #pragma once
 
 #include <condition_variable>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <span>
@@ -63,9 +64,12 @@ SpawnedTask first_task();
 /// Runs tasks. Thread-safe: tasks of one payload share a BakeSession, which the first of them makes while others wait.
 class TaskRunner {
  public:
+  /// Calls `wait`, which returns when another task has got further: others must compute meanwhile, that one too.
+  using Aside = std::function<void(const std::function<void()>& wait)>;
+
   /// Keeps sessions warm within `cache_bytes` (BakeSession::bytes()): beyond it those that were used least recently go, but
-  /// never one in use, nor the last. `blobs` must outlive the runner.
-  explicit TaskRunner(BlobAccess* blobs, uint64_t cache_bytes = uint64_t{1} << 30);
+  /// never one in use, nor the last. `blobs` must outlive the runner. `aside` may be null: threads are free to wait.
+  explicit TaskRunner(BlobAccess* blobs, uint64_t cache_bytes = uint64_t{1} << 30, Aside aside = nullptr);
   ~TaskRunner();
 
   /// A session that is at hand for tasks of this payload: they read no level blob then.
@@ -86,6 +90,7 @@ class TaskRunner {
 
   BlobAccess& blobs_;
   const uint64_t cache_bytes_;
+  const Aside aside_;
   std::mutex mutex_;
   std::condition_variable made_;
   std::vector<std::shared_ptr<Warm>> warm_;  // used last first; guarded by mutex_, and what it points to

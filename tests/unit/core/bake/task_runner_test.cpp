@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <map>
 #include <optional>
 #include <random>
@@ -227,6 +228,27 @@ TEST_F(TaskRunnerTest, WhoWaitsOutlivesACancelledPlanner) {
     cancel.cancel();
   };
   EXPECT_EQ(runner_.run(task(first_task()), control).status().code(), absl::StatusCode::kCancelled);
+  ASSERT_TRUE(waiting.has_value());
+  waiting->join();
+  EXPECT_TRUE(waited.ok()) << waited.status();
+}
+
+// Else those who wait could hold all the cores that the one who plans waits for.
+TEST_F(TaskRunnerTest, WhoWaitsForAnothersPlanStandsAside) {
+  std::atomic<bool> stands_aside = false;
+  TaskRunner runner(&blobs_, uint64_t{1} << 30, [&](const std::function<void()>& wait) {
+    stands_aside = true;
+    stands_aside.notify_all();
+    wait();
+  });
+  std::optional<std::jthread> waiting;
+  absl::StatusOr<TaskOutput> waited = absl::UnknownError("did not run");
+  BakeControl control;
+  control.progress = [&](const std::string&, uint64_t, uint64_t, uint64_t) {
+    if (!waiting) waiting.emplace([&] { waited = runner.run(task(first_task())); });
+    stands_aside.wait(false);
+  };
+  EXPECT_TRUE(runner.run(task(first_task()), control).ok());
   ASSERT_TRUE(waiting.has_value());
   waiting->join();
   EXPECT_TRUE(waited.ok()) << waited.status();
