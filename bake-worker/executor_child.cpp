@@ -96,7 +96,7 @@ class Tasks {
   std::map<uint64_t, std::shared_ptr<CancelFlag>> cancels_;
 };
 
-/// Of what can be written to, so neither libraries nor what allocators and stacks may grow into count.
+/// Of what can be written to, heap and stacks: libraries, and what allocators have set aside only, do not count.
 void limit_memory(uint64_t bytes) {
   if (bytes == 0) return;
   const rlimit limit{bytes, bytes};

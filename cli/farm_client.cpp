@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
-#include <mutex>
 
 #include "core/asset/asset.h"
 #include "core/bake/task_runner.h"
+#include "core/base/first_error.h"
 #include "core/base/random_id.h"
 #include "core/base/text.h"
 #include "core/base/version.h"
@@ -275,12 +275,7 @@ absl::Status FarmClient::fetch_chunks(const ChunkStore& store, const std::vector
                                       const CancelFlag& cancel,
                                       const std::function<void(uint64_t, uint64_t)>& progress) const {
   constexpr int kAtOnce = 8;  // most of the time they wait, for the server or a disk
-  std::mutex mutex;
-  absl::Status first_error;
-  const auto failed = [&] {
-    const std::lock_guard lock(mutex);
-    return !first_error.ok();
-  };
+  FirstError error;
   const auto fetch_one = [&](const ChunkRef& chunk) -> absl::Status {
     if (store.get(chunk).ok()) return absl::OkStatus();
     const auto data = connection_->blobs.download(chunk.digest);
@@ -288,12 +283,10 @@ absl::Status FarmClient::fetch_chunks(const ChunkStore& store, const std::vector
     return store.put(*data).status();
   };
   const bool done = parallel_for(chunks.size(), {kAtOnce, &cancel, progress}, [&](uint64_t i) {
-    if (failed()) return;
-    const absl::Status status = fetch_one(chunks[i]);
-    const std::lock_guard lock(mutex);
-    first_error.Update(status);
+    if (error.failed()) return;
+    if (const absl::Status status = fetch_one(chunks[i]); !status.ok()) error.note(status);
   });
-  LL_RETURN_IF_ERROR(first_error);
+  LL_RETURN_IF_ERROR(error.status());
   if (done) return absl::OkStatus();
   return absl::CancelledError("fetch cancelled; what is there is kept, so fetch goes on from here");
 }

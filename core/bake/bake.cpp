@@ -3,36 +3,17 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <mutex>
 
 #include "core/asset/asset.h"
 #include "core/bake/assemble.h"
 #include "core/bake/session.h"
+#include "core/base/first_error.h"
 #include "core/base/half.h"
 #include "core/base/sh.h"
 #include "core/base/stopwatch.h"
 
 namespace lightloom {
 namespace {
-
-/// The first error of many threads.
-class FirstError {
- public:
-  void note(const absl::Status& status) {
-    const std::lock_guard lock(mutex_);
-    if (status_.ok()) status_ = status;
-    failed_ = true;
-  }
-  /// Further work is not worth it.
-  bool failed() const { return failed_.load(std::memory_order_relaxed); }
-  /// REQUIRES: the threads have ended.
-  const absl::Status& status() const { return status_; }
-
- private:
-  std::mutex mutex_;
-  std::atomic<bool> failed_{false};
-  absl::Status status_;  // guarded by mutex_
-};
 
 absl::Status cancelled(const std::filesystem::path& loom) {
   std::error_code error;
