@@ -300,13 +300,15 @@ TEST_F(Programs, JobsAndWorkersAreShown) {
 
 TEST_F(Programs, WhatWatchPrintsWithoutATerminal) {
   const auto server = start_server();
-  const std::string job = submit(server->address(), scene_, how());
+  // Too long to be done between two lines.
+  const std::string job = submit(server->address(), scene_, how(/*rays=*/16384));
   Process watch({LIGHTLOOM_PROGRAM, "watch", job, "--server", server->address()});
   EXPECT_EQ(watch.line_with("tasks"), "0 of 1 tasks, waiting for a worker");
   const auto worker = start_worker(server->address(), "worker");
   EXPECT_NE(watch.line_with(" running on 1 worker"), "") << watch.output();
-  EXPECT_EQ(watch.wait(), 0);
-  EXPECT_THAT(watch.output(), HasSubstr("job 1: done after "));
+  run({"cancel", job, "--server", server->address()});
+  EXPECT_EQ(watch.wait(), 1);
+  EXPECT_THAT(watch.output(), HasSubstr("job 1: cancelled after "));
 }
 
 TEST_F(Programs, WhatIsNoAddressIsNotCalled) {
