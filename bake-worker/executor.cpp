@@ -1,21 +1,22 @@
 #include "bake-worker/executor.h"
 
+#include <absl/strings/str_cat.h>
+
 #include <new>
 #include <string>
-#include <string_view>
 
 #include "core/base/text.h"
 
 namespace lightloom {
 namespace {
 
-constexpr std::string_view kOutOfMemory = "out of memory in task";
+constexpr char kOutOfMemory[] = "out of memory in task";
 
 }  // namespace
 
 absl::Status out_of_memory(const std::string& kind) {
-  return absl::ResourceExhaustedError(std::string(kOutOfMemory) + " '" + printable(kind, 64) +
-                                      "'; give the worker more memory, or fewer --threads");
+  return absl::ResourceExhaustedError(
+      absl::StrCat(kOutOfMemory, " '", printable(kind, 64), "'; give the worker more memory, or fewer --threads"));
 }
 
 absl::StatusOr<TaskOutput> run_within_memory(TaskExecutor* executor, const BakeTask& task,
