@@ -1,35 +1,11 @@
-// A subcommand of `lightloom` as data: one table of options makes both its parsing and its help.
+// The subcommands of `lightloom`.
 #pragma once
 
-#include <cstdint>
-#include <functional>
-#include <string>
-#include <variant>
-#include <vector>
-
-#include "core/base/status.h"
+#include "core/command_line/program.h"
 
 namespace lightloom {
 
 inline constexpr int kMaxThreads = 1024;
-
-struct Option {
-  std::string name;  ///< "SCENE" positional, "-o,--output" or "--bounces"
-  std::string help;
-  /// Holds the default; bool: a flag. Numbers are parsed whole, and are finite.
-  std::variant<bool*, int*, uint64_t*, float*, std::string*> value;
-  bool required = false;
-};
-
-struct Command {
-  std::string name;
-  std::string help;
-  std::vector<Option> options;
-  /// What can be said before any work: values in range, inputs there, outputs writable. InvalidArgument: the command line
-  /// is at fault.
-  std::function<absl::Status()> check;
-  std::function<absl::Status()> run;
-};
 
 Command bake_command();
 Command cancel_command();

@@ -1,3 +1,4 @@
+#include <absl/strings/str_cat.h>
 #include <spdlog/spdlog.h>
 
 #include <csignal>
@@ -19,10 +20,12 @@ absl::Status serve(const ServeOptions& options) {
                         .method_version = std::string(kMethodVersion),
                         .canary = kCanary};
   LL_ASSIGN_OR_RETURN(const auto server, Server::start(options.listen, info, farm.get(), options.insecure));
-  if (options.insecure) spdlog::warn("--insecure: whoever reaches {} may read and change all jobs", server->address());
-  spdlog::info("listening on {}", server->address());
+  if (options.insecure) {
+    spdlog::warn(absl::StrCat("--insecure: whoever reaches ", server->address(), " may read and change all jobs"));
+  }
+  spdlog::info("listening on " + server->address());
   const int signal = stop.wait();
-  spdlog::info("stopping on {}", signal == SIGINT ? "SIGINT" : "SIGTERM");
+  spdlog::info(signal == SIGINT ? "stopping on SIGINT" : "stopping on SIGTERM");
   return absl::OkStatus();
 }
 

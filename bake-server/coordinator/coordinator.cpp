@@ -1,5 +1,6 @@
 #include "bake-server/coordinator/coordinator.h"
 
+#include <absl/strings/str_cat.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -59,7 +60,7 @@ void Coordinator::wake() {
 
 /// Nothing is lost by an error of the loop: it tries again with the next turn. But somebody should know.
 void Coordinator::warn(const char* what, const absl::Status& status) {
-  if (!status.ok()) spdlog::warn("cannot {}: {}", what, std::string(status.message()));
+  if (!status.ok()) spdlog::warn(absl::StrCat("cannot ", what, ": ", status.message()));
 }
 
 void Coordinator::sync(SyncMessage message, OnAnswer answer) {

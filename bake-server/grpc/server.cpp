@@ -22,7 +22,7 @@ constexpr int kMaxMessageBytes = 2 << 20;
 constexpr std::chrono::seconds kShutdownGrace{1};
 
 /// gRPC prints what it also returns, in many lines: kept for those who debug.
-void log_for_debugging(gpr_log_func_args* entry) { spdlog::debug("gRPC: {}", entry->message); }
+void log_for_debugging(gpr_log_func_args* entry) { spdlog::debug(absl::StrCat("gRPC: ", entry->message)); }
 
 }  // namespace
 

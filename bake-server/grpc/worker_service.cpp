@@ -1,5 +1,6 @@
 #include "bake-server/grpc/worker_service.h"
 
+#include <absl/strings/str_cat.h>
 #include <spdlog/spdlog.h>
 
 #include "bake-server/grpc/tasks.h"
@@ -155,11 +156,11 @@ class WorkerService final : public v1::WorkerService::CallbackService {
                                  v1::JoinResponse* response) override {
     const Admission admission = admit(*request, info_);
     if (admission.accepted()) {
-      spdlog::info("worker {} joined: version {}, {} threads", context->peer(), printable(request->version(), 64),
-                   request->threads());
+      spdlog::info(absl::StrCat("worker ", context->peer(), " joined: version ", printable(request->version(), 64),
+                                ", ", request->threads(), " threads"));
       response->mutable_accepted()->set_server_version(info_.version);
     } else {
-      spdlog::warn("worker {} refused: {}", context->peer(), admission.message);
+      spdlog::warn(absl::StrCat("worker ", context->peer(), " refused: ", admission.message));
       response->mutable_refused()->set_reason(to_proto(admission.refusal));
       response->mutable_refused()->set_message(admission.message);
     }

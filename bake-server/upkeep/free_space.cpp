@@ -30,11 +30,10 @@ absl::Status FreeSpace::check() {
   const bool is_short = free.ok() && *free < least_;
   if (short_.exchange(is_short) != is_short) {
     if (is_short) {
-      spdlog::warn(
-          "{} free at {}, less than --min-free {}: uploads are refused and no tasks given out until there is more",
-          size_text(*free), folder_.string(), size_text(least_));
+      spdlog::warn(absl::StrCat(size_text(*free), " free at ", folder_.string(), ", less than --min-free ",
+                                size_text(least_), ": uploads are refused and no tasks given out until there is more"));
     } else {
-      spdlog::info("there is room at {} again: uploads and tasks go on", folder_.string());
+      spdlog::info(absl::StrCat("there is room at ", folder_.string(), " again: uploads and tasks go on"));
     }
   }
   if (!is_short) return absl::OkStatus();

@@ -1,5 +1,6 @@
 #include "bake-server/upkeep/upkeep.h"
 
+#include <absl/strings/str_cat.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -39,19 +40,21 @@ void Upkeep::loop() {
   while (!stopped_within(std::min(kLookEveryMs, options_.every_ms))) {
     if (clock_() < next_ms) continue;
     const absl::Status status = run().status();
-    if (!status.ok() && !absl::IsCancelled(status)) spdlog::warn("upkeep: {}", std::string(status.message()));
+    if (!status.ok() && !absl::IsCancelled(status)) spdlog::warn(absl::StrCat("upkeep: ", status.message()));
     next_ms = clock_() + options_.every_ms;
   }
 }
 
 absl::StatusOr<uint64_t> Upkeep::run() {
   LL_ASSIGN_OR_RETURN(const uint64_t jobs, forget());
-  if (jobs > 0)
-    spdlog::info("forgot {} that ended long ago (--retain)", jobs == 1 ? "a job" : std::to_string(jobs) + " jobs");
+  if (jobs > 0) {
+    spdlog::info(
+        absl::StrCat("forgot ", jobs == 1 ? "a job" : absl::StrCat(jobs, " jobs"), " that ended long ago (--retain)"));
+  }
   LL_ASSIGN_OR_RETURN(const Garbage garbage,
                       collect_garbage(state_, [this](const VisitDigest& visit) { return store_->referenced(visit); },
                                       {.grace_seconds = options_.grace_seconds, .cancel = &cancel_}));
-  if (garbage.blobs + garbage.uploads > 0) spdlog::info("gc {}", garbage_text(garbage, false));
+  if (garbage.blobs + garbage.uploads > 0) spdlog::info("gc " + garbage_text(garbage, false));
   return jobs;
 }
 

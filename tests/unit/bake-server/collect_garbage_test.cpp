@@ -27,8 +27,6 @@ namespace fs = std::filesystem;
 using testing::HasSubstr;
 using testing::Not;
 
-std::vector<uint8_t> bytes_of(const std::string& text) { return {text.begin(), text.end()}; }
-
 class CollectGarbage : public testing::Test {
  protected:
   void SetUp() override { store_ = value(BlobStore::open(state_.path() / "blobs", Durability::kProcess)); }

@@ -56,6 +56,8 @@ T value(absl::StatusOr<T> result) {
 }
 inline void value(const absl::Status& status) { EXPECT_TRUE(status.ok()) << status; }
 
+inline std::vector<uint8_t> bytes_of(const std::string& text) { return {text.begin(), text.end()}; }
+
 inline Digest digest(int64_t number) { return sha256(absl::StrCat("output ", number)); }
 
 inline NewTask cell(uint32_t stage, int64_t order) { return {"cell", stage, absl::StrCat("argument ", order), order}; }

@@ -34,8 +34,6 @@ using testing::Not;
 
 constexpr int64_t kDay = 86'400'000;
 
-std::vector<uint8_t> bytes_of(const std::string& text) { return {text.begin(), text.end()}; }
-
 /// One line that holds `what`.
 void expect_line(const absl::Status& status, absl::StatusCode code, const std::string& what) {
   EXPECT_EQ(status.code(), code) << status;

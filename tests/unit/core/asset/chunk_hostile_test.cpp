@@ -11,6 +11,8 @@
 namespace lightloom {
 namespace {
 
+using ::lightloom::testing::kInf;
+using ::lightloom::testing::kNan;
 using ::lightloom::testing::peek;
 using ::lightloom::testing::poke;
 using ::lightloom::testing::sample_cell;
@@ -19,9 +21,6 @@ using ::lightloom::testing::sample_surface;
 using ::testing::HasSubstr;
 
 using Bytes = std::vector<uint8_t>;
-
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-constexpr float kInf = std::numeric_limits<float>::infinity();
 
 // Where the sample cell's arrays start, and fields of the records.
 constexpr size_t kObjects = 64, kReceivers = 144, kUniform = 192, kClusters = 208, kProbes = 304, kCorrection = 320,

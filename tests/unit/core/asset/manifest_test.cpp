@@ -12,6 +12,8 @@
 namespace lightloom {
 namespace {
 
+using ::lightloom::testing::kInf;
+using ::lightloom::testing::kNan;
 using ::lightloom::testing::peek;
 using ::lightloom::testing::poke;
 using ::lightloom::testing::sample_manifest;
@@ -19,9 +21,6 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 
 using Bytes = std::vector<uint8_t>;
-
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-constexpr float kInf = std::numeric_limits<float>::infinity();
 
 /// CRC-32 of IEEE 802.3, bit by bit: an oracle for zlib's use and for the document.
 uint32_t slow_crc(const uint8_t* data, size_t size) {

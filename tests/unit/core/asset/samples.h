@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
+#include <limits>
 #include <vector>
 
 #include "core/asset/asset.h"
@@ -11,6 +12,9 @@
 #include "core/asset/manifest.h"
 
 namespace lightloom::testing {
+
+inline constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+inline constexpr float kInf = std::numeric_limits<float>::infinity();
 
 /// Order 1; two objects (4×2, 3×3); five receivers in two clusters: 3 receivers, probes {0,2}, rank 2, and 2
 /// receivers, probe {1}, rank 1.

@@ -51,7 +51,7 @@ class MapBlobs : public BlobAccess {
   std::mutex mutex_;
 };
 
-BakeParams small() {
+BakeParams tiny() {
   BakeParams p;
   p.order = 2;
   p.spacing = 0.4f;
@@ -70,10 +70,10 @@ class TaskRunnerTest : public ::testing::Test {
     scene_ = blobs_.put_one(glb_);
   }
 
-  BakeTask task(const SpawnedTask& spawned, const BakeParams& params = small()) const {
+  BakeTask task(const SpawnedTask& spawned, const BakeParams& params = tiny()) const {
     return {spawned.kind, encode_payload({scene_, params}), spawned.argument, inputs_};
   }
-  TaskOutput plan(const BakeParams& params = small()) { return value_or_die(runner_.run(task(first_task(), params))); }
+  TaskOutput plan(const BakeParams& params = tiny()) { return value_or_die(runner_.run(task(first_task(), params))); }
   /// The first task of that kind.
   static SpawnedTask find(const TaskOutput& plan, const std::string& kind) {
     return *std::find_if(plan.spawned.begin(), plan.spawned.end(), [&](const auto& t) { return t.kind == kind; });
@@ -98,7 +98,7 @@ TEST_F(TaskRunnerTest, ShuffledOverTwoRunnersIsTheBakeByteForByte) {
   const Scene scene = value_or_die(load_gltf(folder_.path() / "cornell.glb"));
   const auto tracer = value_or_die(RayTracer::create(scene));
   const std::filesystem::path loom = folder_.path() / "cornell.loom";
-  const BakeReport report = value_or_die(bake(*tracer, small(), loom, {}));
+  const BakeReport report = value_or_die(bake(*tracer, tiny(), loom, {}));
 
   const TaskOutput planned = plan();
   const PlanSummary summary = value_or_die(decode_plan_summary(value_or_die(blobs_.get(planned.outputs.front()))));
@@ -165,7 +165,7 @@ TEST_F(TaskRunnerTest, RepeatedTasksGiveEqualOutputs) {
 
 TEST_F(TaskRunnerTest, SessionsThatDropOutComeBack) {
   TaskRunner one(&blobs_, 1);
-  BakeParams other = small();
+  BakeParams other = tiny();
   other.order = 1;
   const BakeTask a = task(find(plan(), "cell")), b = task(find(plan(other), "cell"), other);
   blobs_.gets.clear();
@@ -177,7 +177,7 @@ TEST_F(TaskRunnerTest, SessionsThatDropOutComeBack) {
 }
 
 TEST_F(TaskRunnerTest, SessionsStayWarmWithinTheLimit) {
-  BakeParams other = small();
+  BakeParams other = tiny();
   other.order = 1;
   const BakeTask a = task(find(plan(), "cell")), b = task(find(plan(other), "cell"), other);
   TaskRunner both(&blobs_, uint64_t{1} << 30);
@@ -187,7 +187,7 @@ TEST_F(TaskRunnerTest, SessionsStayWarmWithinTheLimit) {
 }
 
 TEST_F(TaskRunnerTest, SessionsKnowWhatTheyTake) {
-  const auto session = value_or_die(BakeSession::create(value_or_die(builtin_scene("cornell")), small(), {}));
+  const auto session = value_or_die(BakeSession::create(value_or_die(builtin_scene("cornell")), tiny(), {}));
   const uint64_t before = session->bytes();
   EXPECT_GT(before, session->plan().receivers.all.size() * sizeof(Receiver));
   const ChunkSink sink = [&](std::span<const uint8_t> bytes) -> absl::StatusOr<ChunkRef> {
@@ -260,16 +260,16 @@ TEST_F(TaskRunnerTest, RefusesWhatItCannotRun) {
   const Digest digest = value_or_die(decode_plan_summary(value_or_die(blobs_.get(planned.outputs.front())))).plan;
 
   EXPECT_THAT(error(task({"dance\n", 0, {}, 0}), kInvalidArgument), HasSubstr("kind 'dance\\n' is unknown"));
-  BakeParams bad = small();
+  BakeParams bad = tiny();
   bad.order = 77;
   EXPECT_THAT(error(task(first_task(), bad), kInvalidArgument), HasSubstr("payload: --order"));
   EXPECT_THAT(error({"plan", {1, 2, 3}, {}, {}}, kInvalidArgument), HasSubstr("payload is corrupt"));
-  EXPECT_THAT(error({"plan", encode_payload({sha256("no"), small()}), {}, {}}, kNotFound),
+  EXPECT_THAT(error({"plan", encode_payload({sha256("no"), tiny()}), {}, {}}, kNotFound),
               HasSubstr("the level, blob " + sha256("no").hex()));
   const Digest garbage = blobs_.put_one(std::vector<uint8_t>(64, 'x'));
-  EXPECT_THAT(error({"plan", encode_payload({garbage, small()}), {}, {}}, kInvalidArgument), HasSubstr("level.glb"));
+  EXPECT_THAT(error({"plan", encode_payload({garbage, tiny()}), {}, {}}, kInvalidArgument), HasSubstr("level.glb"));
   blobs_.blobs[sha256("other")] = glb_;
-  EXPECT_THAT(error({"plan", encode_payload({sha256("other"), small()}), {}, {}}, kDataLoss),
+  EXPECT_THAT(error({"plan", encode_payload({sha256("other"), tiny()}), {}, {}}, kDataLoss),
               HasSubstr("has other bytes"));
 
   const auto with_argument = [&](const char* kind, uint32_t first, uint32_t count, const Digest& of) {

@@ -1,6 +1,7 @@
 // A level with receivers and a few probes, for the tests of the transport.
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -10,6 +11,8 @@
 #include "tests/support/test_scenes.h"
 
 namespace lightloom::test {
+
+inline constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 struct GatherLevel {
   GatherLevel(Scene s, std::vector<Vec3> p) : scene(std::move(s)), probes(std::move(p)) {

@@ -13,8 +13,7 @@ namespace {
 
 using test::crate_level;
 using test::GatherLevel;
-
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
+using test::kInfinity;
 
 std::vector<float> row_of(const GatherLevel& level, VisibilityCache* cache, const GatherPoint& point,
                           const GatherOptions& options, GatherStats* stats = nullptr) {

@@ -13,8 +13,7 @@ namespace {
 
 using test::crate_level;
 using test::GatherLevel;
-
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
+using test::kInfinity;
 
 struct Found {
   Hit hit;
