@@ -55,13 +55,14 @@ int run(int argc, char** argv) {
   const TaskOutput plan = or_exit(runner.run({first.kind, payload, first.argument, {}}, control));
 
   const Stopwatch watch;
-  uint64_t tasks = 0;
+  uint64_t tasks = 0, rays = 0;
   for (const SpawnedTask& task : plan.spawned) {
     if (task.stage != 1 || task.order / kRun % of != mine) continue;
-    or_exit(runner.run({task.kind, payload, task.argument, {}}, control));
+    rays += or_exit(runner.run({task.kind, payload, task.argument, {}}, control)).rays;
     ++tasks;
   }
-  std::printf("{\"tasks\": %llu, \"seconds\": %.3f}\n", static_cast<unsigned long long>(tasks), watch.seconds());
+  std::printf("{\"tasks\": %llu, \"rays\": %llu, \"seconds\": %.3f}\n", static_cast<unsigned long long>(tasks),
+              static_cast<unsigned long long>(rays), watch.seconds());
   return 0;
 }
 

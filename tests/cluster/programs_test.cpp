@@ -323,6 +323,24 @@ TEST_F(Programs, WhatIsNoAddressIsNotCalled) {
   }
 }
 
+TEST_F(Programs, AWorkersCommandLineIsCheckedBeforeAnyServerIsAsked) {
+  const std::vector<std::pair<Words, std::string>> bad = {
+      {{}, "--server is required; see lightloom-worker --help\n"},
+      {{"--server", "x", "--threads", "0"}, "--threads must be 1 to 1024\n"},
+      {{"--server", "x", "--threads", "1e3"}, "--threads '1e3' must be a whole number"},
+      {{"--server", "x", "--timeout", "3601"}, "--timeout must be 1 to 3600\n"},
+      {{"--server", "x", "--name", "a b"}, "letters, digits"},
+      {{"--server", "x", "--memory", "1X"}, "'1X' is no size"},
+      {{"--server", "x", "y"}, "not expected: y; see lightloom-worker --help\n"}};
+  for (const auto& [options, what] : bad) {
+    Process worker(join({LIGHTLOOM_WORKER}, options));
+    EXPECT_EQ(worker.wait(), 2) << what;
+    EXPECT_THAT(worker.output(), HasSubstr(what));
+    EXPECT_THAT(worker.output(), StartsWith("lightloom-worker: "));
+    EXPECT_EQ(std::count(worker.output().begin(), worker.output().end(), '\n'), 1) << worker.output();
+  }
+}
+
 TEST_F(Programs, NobodyListens) {
   std::string address;
   { address = test::Listener().address(); }
