@@ -116,5 +116,5 @@ int main(int argc, char** argv) {
   spdlog::set_default_logger(spdlog::stderr_color_mt("lightloom-worker"));
   const absl::Status status = parsed.command->run();
   if (!status.ok()) spdlog::error(std::string(status.message()));
-  return status.ok() ? 0 : 1;
+  return status.ok() ? 0 : kFailed;
 }
