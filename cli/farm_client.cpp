@@ -303,13 +303,14 @@ absl::StatusOr<Manifest> FarmClient::fetch(uint64_t id, const std::string& loom,
   const auto bytes = connection_->blobs.download(job.outputs.front());
   if (!bytes.ok()) return in_words(bytes.status());
   LL_ASSIGN_OR_RETURN(Manifest manifest, decode_manifest(*bytes));
-  std::vector<ChunkRef> chunks;
-  for (const ObjectEntry& o : manifest.objects) chunks.push_back(o.surface);
-  for (const ProbeEntry& p : manifest.probes) chunks.push_back(p.relight);
-  for (const CellEntry& c : manifest.cells) chunks.push_back(c.chunk);
-  std::erase_if(chunks, [](const ChunkRef& c) { return c.size == 0; });
-  LL_RETURN_IF_ERROR(fetch_chunks(chunk_store(loom), chunks, cancel, progress));
-  LL_RETURN_IF_ERROR(write_manifest(loom, manifest));
+  LL_RETURN_IF_ERROR(fetch_chunks(chunk_store(loom), chunks_of(manifest), cancel, progress));
+  std::vector<uint8_t> traces;
+  if (job.outputs.size() > 1) {
+    auto download = connection_->blobs.download(job.outputs[1]);
+    if (!download.ok()) return in_words(download.status());
+    traces = *std::move(download);
+  }
+  LL_RETURN_IF_ERROR(write_manifest(loom, manifest, traces));
   return manifest;
 }
 

@@ -35,9 +35,7 @@ struct Orphans {
 Orphans find_orphans(const fs::path& loom, const Manifest& m) {
   std::set<fs::path> named;
   const ChunkStore store = chunk_store(loom);
-  for (const CellEntry& c : m.cells) named.insert(store.path(c.chunk.digest));
-  for (const ProbeEntry& p : m.probes) named.insert(store.path(p.relight.digest));
-  for (const ObjectEntry& o : m.objects) named.insert(store.path(o.surface.digest));
+  for (const ChunkRef& chunk : chunks_of(m)) named.insert(store.path(chunk.digest));
   Orphans orphans;
   std::error_code error;
   for (fs::recursive_directory_iterator it(loom / "chunks", error), end; !error && it != end; it.increment(error)) {

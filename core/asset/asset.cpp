@@ -44,6 +44,22 @@ absl::Status verify_cell(const Manifest& m, const CellEntry& entry, const CellCh
   return absl::OkStatus();
 }
 
+constexpr std::string_view kTraces = "traces-";
+
+std::filesystem::path traces_path(const std::filesystem::path& loom, std::span<const uint8_t> manifest) {
+  return loom / (std::string(kTraces) + sha256(manifest).hex());
+}
+
+void remove_traces_but(const std::filesystem::path& kept) {
+  std::vector<std::filesystem::path> others;
+  std::error_code error;
+  for (std::filesystem::directory_iterator it(kept.parent_path(), error), end; !error && it != end;
+       it.increment(error)) {
+    if (it->path().filename().string().starts_with(kTraces) && it->path() != kept) others.push_back(it->path());
+  }
+  for (const std::filesystem::path& other : others) std::filesystem::remove(other, error);
+}
+
 }  // namespace
 
 std::filesystem::path ChunkStore::path(const Digest& digest) const {
@@ -74,8 +90,18 @@ absl::StatusOr<std::vector<uint8_t>> ChunkStore::get(const ChunkRef& ref) const 
 
 ChunkStore chunk_store(const std::filesystem::path& loom) { return ChunkStore(loom / "chunks"); }
 
-absl::Status write_manifest(const std::filesystem::path& loom, const Manifest& manifest) {
-  return write_file_atomic(loom / "manifest", encode_manifest(manifest));
+absl::Status write_manifest(const std::filesystem::path& loom, const Manifest& manifest,
+                            std::span<const uint8_t> traces) {
+  const std::vector<uint8_t> bytes = encode_manifest(manifest);
+  const std::filesystem::path its_traces = traces_path(loom, bytes);
+  if (!traces.empty()) LL_RETURN_IF_ERROR(write_file_atomic(its_traces, traces));
+  LL_RETURN_IF_ERROR(write_file_atomic(loom / "manifest", bytes));
+  remove_traces_but(its_traces);
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::vector<uint8_t>> read_traces(const std::filesystem::path& loom, const Manifest& manifest) {
+  return read_file(traces_path(loom, encode_manifest(manifest)));
 }
 
 absl::StatusOr<Manifest> read_manifest(const std::filesystem::path& loom) {

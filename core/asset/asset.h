@@ -27,8 +27,14 @@ class ChunkStore {
 
 /// OUT.loom/manifest and OUT.loom/chunks.
 ChunkStore chunk_store(const std::filesystem::path& loom);
-absl::Status write_manifest(const std::filesystem::path& loom, const Manifest& manifest);
+/// Puts the manifest in force, whole or not at all. `traces`, if not empty: what the next bake wants to know of this one
+/// (core/bake/bake_traces.h). They stand in a file whose name is the manifest's SHA-256, so that an asset never has
+/// another bake's; no runtime reads them, and an asset without them is whole. Those of other manifests are removed.
+absl::Status write_manifest(const std::filesystem::path& loom, const Manifest& manifest,
+                            std::span<const uint8_t> traces = {});
 absl::StatusOr<Manifest> read_manifest(const std::filesystem::path& loom);
+/// NotFound: the bake left none.
+absl::StatusOr<std::vector<uint8_t>> read_traces(const std::filesystem::path& loom, const Manifest& manifest);
 
 /// Reads every chunk and checks that manifest and chunks agree: digests, counts, sizes, orders, object identities.
 /// The error names the first chunk at fault.

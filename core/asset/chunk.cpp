@@ -7,6 +7,7 @@
 
 #include "core/base/bytes.h"
 #include "core/base/check.h"
+#include "core/base/octahedral.h"
 #include "core/base/sh.h"
 
 namespace lightloom {
@@ -59,14 +60,7 @@ Vec3 decode_normal(uint32_t bits) {
   const auto snorm = [](uint32_t b) {
     return std::max(static_cast<float>(static_cast<int16_t>(b & 0xffffu)) / 32767.0f, -1.0f);
   };
-  float u = snorm(bits), v = snorm(bits >> 16);
-  const float z = 1 - std::abs(u) - std::abs(v);
-  if (z < 0) {
-    const float fu = (1 - std::abs(v)) * std::copysign(1.0f, u);
-    v = (1 - std::abs(u)) * std::copysign(1.0f, v);
-    u = fu;
-  }
-  return normalize({u, v, z});
+  return normalize(from_octahedral({snorm(bits), snorm(bits >> 16)}));
 }
 
 absl::Status check_objects(std::string_view what, const std::vector<ChunkObject>& objects) {
@@ -82,17 +76,11 @@ absl::Status check_objects(std::string_view what, const std::vector<ChunkObject>
 }  // namespace
 
 uint32_t encode_normal(Vec3 n) {
-  const float sum = std::abs(n.x) + std::abs(n.y) + std::abs(n.z);
-  float u = n.x / sum, v = n.y / sum;
-  if (n.z < 0) {
-    const float fu = (1 - std::abs(v)) * std::copysign(1.0f, u);
-    v = (1 - std::abs(u)) * std::copysign(1.0f, v);
-    u = fu;
-  }
+  const Vec2 p = octahedral(n);
   const auto snorm = [](float c) {
     return static_cast<uint16_t>(static_cast<int16_t>(std::floor(std::clamp(c, -1.0f, 1.0f) * 32767.0f + 0.5f)));
   };
-  return static_cast<uint32_t>(snorm(u)) | static_cast<uint32_t>(snorm(v)) << 16;
+  return static_cast<uint32_t>(snorm(p.x)) | static_cast<uint32_t>(snorm(p.y)) << 16;
 }
 
 std::vector<uint8_t> encode_cell(const CellChunk& c) {

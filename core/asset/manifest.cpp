@@ -126,6 +126,15 @@ absl::Status validate(const Manifest& m) {
 
 }  // namespace
 
+std::vector<ChunkRef> chunks_of(const Manifest& m) {
+  std::vector<ChunkRef> chunks;
+  for (const ObjectEntry& o : m.objects) chunks.push_back(o.surface);
+  for (const ProbeEntry& p : m.probes) chunks.push_back(p.relight);
+  for (const CellEntry& c : m.cells) chunks.push_back(c.chunk);
+  std::erase_if(chunks, [](const ChunkRef& c) { return c.size == 0; });
+  return chunks;
+}
+
 std::vector<uint8_t> encode_manifest(const Manifest& m) {
   std::string strings = m.method_version;
   std::vector<ObjectRecord> objects;

@@ -63,9 +63,6 @@ struct ObjectEntry {
   bool operator==(const ObjectEntry&) const = default;
 };
 
-/// Integer coordinates of a cell of the world grid: the cell covers [i, i+1)·side.
-using GridCell = std::array<int32_t, 3>;
-
 struct ProbeEntry {
   Vec3 position;
   GridCell cell{};    ///< world cell of side `spacing`
@@ -107,6 +104,9 @@ struct Manifest {
   std::vector<ClusterEntry> clusters;
   std::vector<uint32_t> cell_probes;  ///< indices into `probes`; cell chunks say "my i-th probe"
 };
+
+/// All chunks that it names, in no particular order; some may be named more than once.
+std::vector<ChunkRef> chunks_of(const Manifest& manifest);
 
 std::vector<uint8_t> encode_manifest(const Manifest& manifest);
 /// Checks magic, version, CRC, every count against the bytes that are there, every index, and that numbers are finite.

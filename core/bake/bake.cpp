@@ -6,6 +6,7 @@
 
 #include "core/asset/asset.h"
 #include "core/bake/assemble.h"
+#include "core/bake/reuse.h"
 #include "core/bake/session.h"
 #include "core/base/first_error.h"
 #include "core/base/half.h"
@@ -22,7 +23,24 @@ absl::Status cancelled(const std::filesystem::path& loom) {
                               (old ? " still holds the earlier bake, whole" : " holds no asset yet: bake again"));
 }
 
+template <class Record>
+void take_over(const std::vector<ReuseItem>& items, const std::vector<Record>& earlier, std::vector<Record>* records) {
+  for (size_t i = 0; i < items.size(); ++i) {
+    if (items[i].why == ReuseItem::kHolds) (*records)[i] = earlier[items[i].earlier];
+  }
+}
+
 }  // namespace
+
+void count_reused(const Reuse& reuse, const Manifest& m, BakeReport* report) {
+  for (size_t i = 0; i < reuse.cells.size(); ++i) {
+    if (reuse.cells[i].why != ReuseItem::kHolds) continue;
+    ++report->cells_reused;
+    report->clusters_reused += m.cells[i].clusters;
+  }
+  const auto holds = [](const ReuseItem& item) { return item.why == ReuseItem::kHolds; };
+  report->probes_reused = static_cast<uint64_t>(std::count_if(reuse.probes.begin(), reuse.probes.end(), holds));
+}
 
 BakeReport report_of(const Manifest& m) {
   BakeReport r;
@@ -56,7 +74,7 @@ BakeReport report_of(const Manifest& m) {
 }
 
 absl::StatusOr<BakeReport> bake(const RayTracer& tracer, const BakeParams& params, const std::filesystem::path& loom,
-                                const BakeControl& control) {
+                                const BakeControl& control, const BakeTraces* earlier) {
   const Stopwatch watch;
   LL_ASSIGN_OR_RETURN(const auto session, BakeSession::create(tracer, params, control));
   const double seconds_plan = watch.seconds();
@@ -78,28 +96,37 @@ absl::StatusOr<BakeReport> bake(const RayTracer& tracer, const BakeParams& param
   };
 
   std::vector<CellRecord> cells(plan.cells.size());
+  std::vector<RelightRecord> relight(plan.placement.probes.size());
+  Reuse reuse{std::vector<ReuseItem>(cells.size()), std::vector<ReuseItem>(relight.size()), 0};
+  if (earlier != nullptr) {
+    LL_ASSIGN_OR_RETURN(reuse, find_reuse(plan, session->scene(), session->world(), *earlier, control.stage("reuse")));
+    take_over(reuse.cells, earlier->cells, &cells);
+    take_over(reuse.probes, earlier->probes, &relight);
+  }
+
+  const std::vector<uint32_t> dirty_cells = dirty_first(reuse.cells);
   Parallel cell_stage = control.stage("cells");
   if (control.progress) {
     cell_stage.progress = [&](uint64_t finished, uint64_t total) {
       control.progress("cells", finished, total, session->spent().cell_rays());
     };
   }
-  bool done = parallel_for(cells.size(), cell_stage, [&](uint64_t i) {
+  bool done = parallel_for(dirty_cells.size(), cell_stage, [&](uint64_t i) {
     if (error.failed()) return;
-    auto cell = session->cell(i, sink, control.cancel);
+    auto cell = session->cell(dirty_cells[i], sink, control.cancel);
     if (!cell.ok()) return error.note(cell.status());
-    cells[i] = std::move(cell->record);
+    cells[dirty_cells[i]] = std::move(cell->record);
   });
   LL_RETURN_IF_ERROR(outcome(done));
 
   // Probes that no cell reads need no relight sets.
-  const std::vector<uint32_t> used = used_probes(cells);
-  std::vector<ChunkRef> relight(plan.placement.probes.size());
-  done = parallel_for(used.size(), control.stage("relight rays"), [&](uint64_t i) {
+  LL_ASSIGN_OR_RETURN(std::vector<uint32_t> wanted, used_probes(plan, cells));
+  std::erase_if(wanted, [&](uint32_t p) { return reuse.probes[p].why == ReuseItem::kHolds; });
+  done = parallel_for(wanted.size(), control.stage("relight rays"), [&](uint64_t i) {
     if (error.failed()) return;
-    const auto refs = session->relight(used[i], 1, sink, control.cancel);
-    if (!refs.ok()) return error.note(refs.status());
-    relight[used[i]] = refs->front();
+    auto records = session->relight(wanted[i], 1, sink, control.cancel);
+    if (!records.ok()) return error.note(records.status());
+    relight[wanted[i]] = std::move(records->front());
   });
   LL_RETURN_IF_ERROR(outcome(done));
   std::vector<ChunkRef> surfaces(session->scene().objects.size());
@@ -107,10 +134,13 @@ absl::StatusOr<BakeReport> bake(const RayTracer& tracer, const BakeParams& param
     LL_ASSIGN_OR_RETURN(surfaces[o], session->surface(o, sink));
   }
 
-  LL_ASSIGN_OR_RETURN(const Manifest manifest, session->manifest(cells, relight, surfaces));
-  LL_RETURN_IF_ERROR(write_manifest(loom, manifest));
+  LL_ASSIGN_OR_RETURN(const BakeSession::Finished finished,
+                      session->finish(std::move(cells), std::move(relight), surfaces));
+  const Manifest& manifest = finished.manifest;
+  LL_RETURN_IF_ERROR(write_manifest(loom, manifest, encode_bake_traces(finished.traces)));
   BakeReport report = report_of(manifest);
   add_times(*session, control.threads, &report);
+  count_reused(reuse, manifest, &report);
   report.seconds_plan = seconds_plan;
   report.seconds_write = seconds_write;
   report.seconds_total = watch.seconds();

@@ -4,7 +4,9 @@
 #include <filesystem>
 
 #include "core/asset/manifest.h"
+#include "core/bake/bake_traces.h"
 #include "core/bake/plan.h"
+#include "core/bake/reuse.h"
 #include "core/bake/session.h"
 
 namespace lightloom {
@@ -18,18 +20,22 @@ struct BakeReport {
   /// Thread time ÷ threads.
   double seconds_transport = 0, seconds_compress = 0, seconds_relight = 0;
   double seconds_write = 0;
-  uint64_t clusters_reused = 0;  ///< taken from an earlier bake; this one bakes every cluster anew
+  uint64_t clusters_reused = 0, cells_reused = 0, probes_reused = 0;  ///< taken over from an earlier bake
   uint64_t bytes_total = 0, bytes_projection = 0, bytes_reconstruction = 0, bytes_relight = 0;
 };
 
 /// What a finished asset says of its bake; nothing of times, nor of visibility rays.
 BakeReport report_of(const Manifest& manifest);
 
+/// What of the manifest's bake was taken over.
+void count_reused(const Reuse& reuse, const Manifest& manifest, BakeReport* report);
+
 /// What `session` spent; its threads were so many (0: one per hardware thread).
 void add_times(const BakeSession& session, int threads, BakeReport* report);
 
-/// Bakes into the folder `loom`. The old manifest, if any, stays in force until the new one replaces it whole.
+/// Bakes into the folder `loom`. The old manifest, if any, stays in force until the new one replaces it whole. What holds
+/// of `earlier`, whose chunks are there, is taken over: the bytes are the same as without it.
 absl::StatusOr<BakeReport> bake(const RayTracer& tracer, const BakeParams& params, const std::filesystem::path& loom,
-                                const BakeControl& control);
+                                const BakeControl& control, const BakeTraces* earlier = nullptr);
 
 }  // namespace lightloom

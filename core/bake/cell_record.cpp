@@ -11,17 +11,18 @@ namespace lightloom {
 namespace {
 
 constexpr uint32_t kMagic = 0x5243424cu;  // "LBCR"
-constexpr uint32_t kVersion = 1;
+constexpr uint32_t kVersion = 2;
 
 struct Header {
   uint32_t magic, version, probes, clusters;
+  Digest key;
   ChunkRef chunk;
   Vec3 lo, hi;
   uint64_t gather_rays, unseen;
   double error;
   uint64_t coefficients, bytes_projection, bytes_reconstruction;
 };
-static_assert(sizeof(Header) == 128 && sizeof(ClusterEntry) == 40 && sizeof(ChunkRef) == 40);
+static_assert(sizeof(Header) == 160 && sizeof(ClusterEntry) == 40 && sizeof(ChunkRef) == 40);
 
 absl::Status corrupt(std::string_view why) {
   return absl::DataLossError("cell record is corrupt: " + std::string(why) + "; run the cell's task again");
@@ -47,11 +48,12 @@ uint64_t CellRecord::receivers() const {
 
 std::vector<uint8_t> encode_cell_record(const CellRecord& c) {
   ByteWriter w;
-  w.value(Header{kMagic, kVersion, static_cast<uint32_t>(c.probe_ids.size()), static_cast<uint32_t>(c.clusters.size()),
-                 c.chunk, c.bounds.lo, c.bounds.hi, c.gather_rays, c.unseen, c.error, c.coefficients,
+  w.value(Header{kMagic, kVersion, static_cast<uint32_t>(c.probes.size()), static_cast<uint32_t>(c.clusters.size()),
+                 c.key, c.chunk, c.bounds.lo, c.bounds.hi, c.gather_rays, c.unseen, c.error, c.coefficients,
                  c.bytes_projection, c.bytes_reconstruction});
-  w.array(c.probe_ids);
+  w.array(c.probes);
   w.array(c.clusters);
+  write_trace(c.trace, &w);
   return std::move(w).take();
 }
 
@@ -61,9 +63,13 @@ absl::StatusOr<CellRecord> decode_cell_record(std::span<const uint8_t> bytes) {
   if (header.magic != kMagic) return corrupt("it does not start with LBCR");
   if (header.version != kVersion) return corrupt("version " + std::to_string(header.version) + " is unknown");
   CellRecord c;
-  c.probe_ids = r.array<uint32_t>(header.probes);
+  c.probes = r.array<ProbeName>(header.probes);
   c.clusters = r.array<ClusterEntry>(header.clusters);
+  auto trace = read_trace(&r);
   if (!r.at_end()) return corrupt("its length does not match its counts");
+  if (!trace.ok()) return corrupt(std::string(trace.status().message()));
+  c.trace = *std::move(trace);
+  c.key = header.key;
   c.chunk = header.chunk;
   c.bounds = {header.lo, header.hi};
   c.gather_rays = header.gather_rays;
@@ -78,12 +84,12 @@ absl::StatusOr<CellRecord> decode_cell_record(std::span<const uint8_t> bytes) {
   if (!valid_box(c.bounds)) return corrupt("its bounds are not finite or empty");
   if (!std::isfinite(c.error) || c.error < 0) return corrupt("its error is out of range");
   if (c.unseen > c.gather_rays) return corrupt("more rays are unseen than were shot");
-  if (std::adjacent_find(c.probe_ids.begin(), c.probe_ids.end(), std::greater_equal<>()) != c.probe_ids.end()) {
+  if (std::adjacent_find(c.probes.begin(), c.probes.end(), std::greater_equal<>()) != c.probes.end()) {
     return corrupt("its probes do not ascend");
   }
   for (const ClusterEntry& k : c.clusters) {
     if (k.receivers == 0) return corrupt("a cluster has no receivers");
-    if (k.probes > c.probe_ids.size()) return corrupt("a cluster has more probes than the cell");
+    if (k.probes > c.probes.size()) return corrupt("a cluster has more probes than the cell");
     if (k.rank > 0 && k.probes == 0) return corrupt("a cluster has columns but no probes");
     if (!valid_box(k.bounds)) return corrupt("a cluster's bounds are not finite or empty");
     if (!std::isfinite(k.error) || k.error < 0) return corrupt("a cluster's error is out of range");

@@ -1,4 +1,5 @@
-// What the rest of a bake needs of a finished cell besides its chunk. The cell's task stores it, assembly reads it.
+// What the rest of a bake needs of a finished cell besides its chunk, and a later bake to use it again. The cell's task
+// stores it, assembly reads it.
 #pragma once
 
 #include <cstdint>
@@ -6,6 +7,8 @@
 #include <vector>
 
 #include "core/asset/manifest.h"
+#include "core/probes/probe_name.h"
+#include "core/trace/trace.h"
 
 namespace lightloom {
 
@@ -19,7 +22,9 @@ struct CellRecord {
   uint64_t coefficients = 0;           ///< Σ rank · receivers over the clusters
   uint64_t bytes_projection = 0;       ///< of the chunk
   uint64_t bytes_reconstruction = 0;   ///< of the chunk
-  std::vector<uint32_t> probe_ids;     ///< the plan's indices of probes that it reads, ascending
+  Digest key;                          ///< cell_key()
+  Trace trace;                         ///< it reads geometry
+  std::vector<ProbeName> probes;       ///< that it reads, ascending
   std::vector<ClusterEntry> clusters;  ///< in the chunk's order
   uint64_t receivers() const;          ///< of all clusters
 };

@@ -154,6 +154,7 @@ absl::StatusOr<Plan> make_plan(const RayTracer& tracer, const BakeParams& reques
     return scene.objects[ra.object].id < scene.objects[rb.object].id;
   });
   plan.cells = Octree(plan.receivers, static_cast<uint32_t>(plan.params.cell_receivers)).leaves(std::move(all));
+  plan.grid = WorldGrid::around(scene.bounds(), plan.params.spacing);
   return plan;
 }
 

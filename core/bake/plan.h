@@ -13,6 +13,7 @@
 #include "core/receivers/layout.h"
 #include "core/receivers/receivers.h"
 #include "core/scene/ray_tracer.h"
+#include "core/trace/world_grid.h"
 
 namespace lightloom {
 
@@ -41,6 +42,7 @@ struct Plan {
   Receivers receivers;
   PlacementResult placement;
   std::vector<PlannedCell> cells;
+  WorldGrid grid;  ///< by which traces are kept
   double seconds_receivers = 0, seconds_probes = 0;  ///< that finding them took
 };
 

@@ -40,14 +40,16 @@ absl::Status not_planned(std::string_view what, size_t index, size_t planned) {
                                std::to_string(planned) + "; run the tasks that the plan asks for");
 }
 
-CellRecord make_record(const CellResult& c, const ChunkRef& chunk) {
+CellRecord make_record(const Plan& plan, const CellTask& task, const CellResult& c, const ChunkRef& chunk) {
   CellRecord record;
+  record.key = task.key;
+  record.trace = c.trace;
   record.chunk = chunk;
   record.bounds = c.bounds;
   record.gather_rays = c.stats.gather_rays;
   record.unseen = c.stats.unseen;
   record.error = c.error;
-  record.probe_ids = c.probe_ids;
+  for (const uint32_t p : c.probe_ids) record.probes.push_back(plan.placement.probes[p].name());
   for (const CellChunk::Cluster& k : c.chunk.clusters) {
     record.clusters.push_back({k.bounds, k.receivers, k.rank(), static_cast<uint32_t>(k.probes.size()), k.error});
     record.coefficients += static_cast<uint64_t>(k.rank()) * k.receivers;
@@ -124,26 +126,26 @@ absl::StatusOr<BakedCell> BakeSession::cell(size_t index, const ChunkSink& sink,
     spent_.compress_seconds += result.compress_seconds;
   }
   LL_ASSIGN_OR_RETURN(const ChunkRef chunk, sink(encode_cell(result.chunk)));
-  return BakedCell{make_record(result, chunk), result.stats.visibility_rays};
+  return BakedCell{make_record(plan_, task, result, chunk), result.stats.visibility_rays};
 }
 
-absl::StatusOr<std::vector<ChunkRef>> BakeSession::relight(size_t first, size_t count, const ChunkSink& sink,
-                                                           const CancelFlag* cancel) const {
+absl::StatusOr<std::vector<RelightRecord>> BakeSession::relight(size_t first, size_t count, const ChunkSink& sink,
+                                                                const CancelFlag* cancel) const {
   const auto& probes = plan_.placement.probes;
   if (first > probes.size() || count > probes.size() - first) {
     return not_planned("probe", first + count - 1, probes.size());
   }
-  std::vector<ChunkRef> refs;
+  std::vector<RelightRecord> records;
   const Stopwatch watch;
   for (size_t i = first; i < first + count; ++i) {
     if (cancel != nullptr && cancel->cancelled()) return absl::CancelledError("relight rays cancelled");
-    LL_ASSIGN_OR_RETURN(const ChunkRef chunk,
-                        sink(encode_relight(bake_relight(tracer_, plan_, search_, probes[i].position))));
-    refs.push_back(chunk);
+    RelightResult result = bake_relight(tracer_, plan_, search_, probes[i].position);
+    LL_ASSIGN_OR_RETURN(const ChunkRef chunk, sink(encode_relight(result.chunk)));
+    records.push_back({probes[i].name(), relight_key(plan_, probes[i]), chunk, std::move(result.trace)});
   }
   const std::lock_guard lock(mutex_);
   spent_.relight_seconds += watch.seconds();
-  return refs;
+  return records;
 }
 
 uint64_t BakeSession::bytes() const { return bytes_ + (cache_ != nullptr ? cache_->bytes() : 0); }
@@ -161,10 +163,24 @@ absl::StatusOr<ChunkRef> BakeSession::surface(size_t object, const ChunkSink& si
   return sink(encode_surface(surface));
 }
 
-absl::StatusOr<Manifest> BakeSession::manifest(const std::vector<CellRecord>& cells,
-                                               const std::vector<ChunkRef>& relight,
-                                               const std::vector<ChunkRef>& surfaces) const {
-  return assemble(plan_, scene(), cells, relight, surfaces);
+const WorldContents& BakeSession::world() const {
+  std::call_once(world_known_, [&] { world_ = contents_of(scene(), plan_.layout, plan_.receivers, plan_.grid); });
+  return world_;
+}
+
+absl::StatusOr<BakeSession::Finished> BakeSession::finish(std::vector<CellRecord> cells,
+                                                          std::vector<RelightRecord> relight,
+                                                          const std::vector<ChunkRef>& surfaces) const {
+  std::vector<ChunkRef> relight_chunks;
+  for (const RelightRecord& r : relight) relight_chunks.push_back(r.chunk);
+  Finished out;
+  LL_ASSIGN_OR_RETURN(out.manifest, assemble(plan_, scene(), cells, relight_chunks, surfaces));
+
+  // Of the probes, those that are in the asset: the chunks of others may be gone when they are wanted.
+  LL_ASSIGN_OR_RETURN(const std::vector<uint32_t> used, used_probes(plan_, cells));
+  out.traces = {world(), std::move(cells), {}};
+  for (const uint32_t p : used) out.traces.probes.push_back(std::move(relight[p]));
+  return out;
 }
 
 }  // namespace lightloom

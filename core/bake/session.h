@@ -7,8 +7,10 @@
 #include <span>
 #include <vector>
 
+#include "core/bake/bake_traces.h"
 #include "core/bake/cell_record.h"
 #include "core/bake/plan.h"
+#include "core/bake/relight_record.h"
 #include "core/receivers/receiver_search.h"
 #include "core/transport/visibility_cache.h"
 
@@ -46,8 +48,8 @@ class BakeSession {
   /// Bakes plan().cells[index] and stores its chunk. `cancel` may be null, here and below.
   absl::StatusOr<BakedCell> cell(size_t index, const ChunkSink& sink, const CancelFlag* cancel = nullptr) const;
   /// Relight sets of the plan's probes first … first + count − 1, in order.
-  absl::StatusOr<std::vector<ChunkRef>> relight(size_t first, size_t count, const ChunkSink& sink,
-                                                const CancelFlag* cancel = nullptr) const;
+  absl::StatusOr<std::vector<RelightRecord>> relight(size_t first, size_t count, const ChunkSink& sink,
+                                                     const CancelFlag* cancel = nullptr) const;
   /// The receivers of an object; size 0 and nothing stored if it has none.
   absl::StatusOr<ChunkRef> surface(size_t object, const ChunkSink& sink) const;
   /// Of all calls so far, also those whose chunk could not be stored.
@@ -57,9 +59,15 @@ class BakeSession {
     uint64_t cell_rays() const { return gather_rays + visibility_rays; }
   };
   Spent spent() const;
-  /// See assemble().
-  absl::StatusOr<Manifest> manifest(const std::vector<CellRecord>& cells, const std::vector<ChunkRef>& relight,
-                                    const std::vector<ChunkRef>& surfaces) const;
+  /// What the level's cells of the world hold: what traces are compared by.
+  const WorldContents& world() const;
+  struct Finished {
+    Manifest manifest;
+    BakeTraces traces;
+  };
+  /// See assemble(). `relight`: by probes of the plan, those without a chunk are absent.
+  absl::StatusOr<Finished> finish(std::vector<CellRecord> cells, std::vector<RelightRecord> relight,
+                                  const std::vector<ChunkRef>& surfaces) const;
 
  private:
   /// What a session keeps alive; empty around a borrowed tracer.
@@ -77,6 +85,8 @@ class BakeSession {
   std::unique_ptr<VisibilityCache> cache_;  // none for SL17, as published
   ReceiverSearch search_;
   const uint64_t bytes_;  // without what grows
+  mutable std::once_flag world_known_;
+  mutable WorldContents world_;  // once it is known
   mutable std::mutex mutex_;
   mutable Spent spent_;  // guarded by mutex_
 };

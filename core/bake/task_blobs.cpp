@@ -16,6 +16,8 @@ constexpr uint32_t kPayloadMagic = 0x4150424cu;   // "LBPA"
 constexpr uint32_t kArgumentMagic = 0x5241424cu;  // "LBAR"
 constexpr uint32_t kSummaryMagic = 0x5350424cu;   // "LBPS"
 constexpr uint32_t kRefsMagic = 0x4c43424cu;      // "LBCL"
+constexpr uint32_t kEarlierMagic = 0x4145424cu;   // "LBEA"
+constexpr uint32_t kReusedMagic = 0x5552424cu;    // "LBRU"
 
 struct Tag {
   uint32_t magic, version;
@@ -41,8 +43,17 @@ struct RefsHeader {
   Tag tag;
   uint64_t refs;
 };
+struct EarlierRecord {
+  Tag tag;
+  Digest traces;
+};
+struct ReusedHeader {
+  Tag tag;
+  Digest traces;
+  uint32_t cells, probes;
+};
 static_assert(sizeof(BakeParams) == 56 && sizeof(PayloadRecord) == 104 && sizeof(ArgumentRecord) == 48 &&
-              sizeof(SummaryRecord) == 64 && sizeof(RefsHeader) == 16 && sizeof(ChunkRef) == 40);
+              sizeof(SummaryRecord) == 64 && sizeof(RefsHeader) == 16 && sizeof(EarlierRecord) == 40 && sizeof(ReusedHeader) == 48 && sizeof(ChunkRef) == 40);
 
 absl::Status corrupt(std::string_view what, std::string_view why) {
   return absl::InvalidArgumentError(std::string(what) + " is corrupt: " + std::string(why) +
@@ -105,6 +116,35 @@ std::vector<uint8_t> encode_argument(const TaskArgument& a) {
 absl::StatusOr<TaskArgument> decode_argument(std::span<const uint8_t> bytes) {
   LL_ASSIGN_OR_RETURN(const auto record, read_record<ArgumentRecord>("task argument", bytes, kArgumentMagic));
   return TaskArgument{record.plan, record.first, record.count};
+}
+
+std::vector<uint8_t> encode_earlier_argument(const Digest& traces) {
+  return write_record(EarlierRecord{{kEarlierMagic, kLayout}, traces});
+}
+
+absl::StatusOr<Digest> decode_earlier_argument(std::span<const uint8_t> bytes) {
+  LL_ASSIGN_OR_RETURN(const auto record, read_record<EarlierRecord>("argument of plan", bytes, kEarlierMagic));
+  return record.traces;
+}
+
+std::vector<uint8_t> encode_reused_results(const ReusedResults& reused) {
+  ByteWriter w;
+  w.value(ReusedHeader{{kReusedMagic, kLayout},
+                       reused.traces,
+                       static_cast<uint32_t>(reused.cells.size()),
+                       static_cast<uint32_t>(reused.probes.size())});
+  w.array(reused.cells);
+  w.array(reused.probes);
+  return std::move(w).take();
+}
+
+absl::StatusOr<ReusedResults> decode_reused_results(std::span<const uint8_t> bytes) {
+  ByteReader r(bytes);
+  const auto header = r.value<ReusedHeader>();
+  LL_RETURN_IF_ERROR(check_tag("list of reused results", header.tag, kReusedMagic));
+  ReusedResults reused{header.traces, r.array<uint32_t>(header.cells), r.array<uint32_t>(header.probes)};
+  if (!r.at_end()) return corrupt("list of reused results", "its length does not match its counts");
+  return reused;
 }
 
 std::vector<uint8_t> encode_plan_summary(const PlanSummary& s) {

@@ -21,7 +21,7 @@ std::vector<uint8_t> encode_payload(const BakePayload& payload);
 /// Errors: InvalidArgument (corrupt, or parameters out of range), FailedPrecondition (another method's).
 absl::StatusOr<BakePayload> decode_payload(std::span<const uint8_t> bytes);
 
-/// The argument of every kind but "plan", which has none.
+/// The argument of every kind but "plan".
 struct TaskArgument {
   Digest plan;  ///< BakeSession::plan_digest() of who asked for it
   uint32_t first = 0, count = 0;
@@ -29,6 +29,20 @@ struct TaskArgument {
 };
 std::vector<uint8_t> encode_argument(const TaskArgument& argument);
 absl::StatusOr<TaskArgument> decode_argument(std::span<const uint8_t> bytes);
+
+/// The argument of "plan" where an earlier bake may be used again: the blob of its encode_bake_traces(). Else it has none.
+std::vector<uint8_t> encode_earlier_argument(const Digest& traces);
+absl::StatusOr<Digest> decode_earlier_argument(std::span<const uint8_t> argument);
+
+/// Which results of an earlier bake "plan" found to hold: nobody is asked for them.
+struct ReusedResults {
+  static constexpr uint32_t kNone = 0xffffffffu;
+  Digest traces;                        ///< the earlier bake's
+  std::vector<uint32_t> cells, probes;  ///< for each that is planned: its index in the traces, or kNone
+  bool operator==(const ReusedResults&) const = default;
+};
+std::vector<uint8_t> encode_reused_results(const ReusedResults& reused);
+absl::StatusOr<ReusedResults> decode_reused_results(std::span<const uint8_t> bytes);
 
 /// What "plan" found: for people and progress bars.
 struct PlanSummary {

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "core/bake/load_glb.h"
+#include "core/bake/reuse.h"
 #include "core/base/text.h"
 
 namespace lightloom {
@@ -74,19 +75,40 @@ absl::StatusOr<std::vector<uint8_t>> fetch(BlobAccess* blobs, const Digest& dige
   return bytes;
 }
 
-/// Stores the list of chunks; outputs are it and them.
-absl::StatusOr<TaskOutput> chunk_outputs(const Context& c, const std::vector<ChunkRef>& refs) {
-  TaskOutput out;
-  LL_ASSIGN_OR_RETURN(const Digest list, c.put(encode_chunk_refs(refs)));
-  out.outputs.push_back(list);
-  for (const ChunkRef& ref : refs) {
-    if (ref.size > 0) out.outputs.push_back(ref.digest);
+absl::StatusOr<BakeTraces> fetch_traces(const Context& c, const Digest& digest) {
+  LL_ASSIGN_OR_RETURN(const auto bytes, fetch(&c.blobs, digest, "the traces of the earlier bake"));
+  return decode_bake_traces(bytes);
+}
+
+/// What of the earlier bake, if the task names one, holds.
+absl::StatusOr<Reuse> look_back(const Context& c) {
+  const Plan& plan = c.session.plan();
+  if (c.task.argument.empty()) {
+    return Reuse{std::vector<ReuseItem>(plan.cells.size()), std::vector<ReuseItem>(plan.placement.probes.size()), 0};
   }
+  LL_ASSIGN_OR_RETURN(const Digest digest, decode_earlier_argument(c.task.argument));
+  LL_ASSIGN_OR_RETURN(const BakeTraces earlier, fetch_traces(c, digest));
+  return find_reuse(plan, c.session.scene(), c.session.world(), earlier, c.control.stage("reuse"));
+}
+
+absl::StatusOr<ReusedResults> reused_results(const Context& c, const Reuse& reuse) {
+  ReusedResults out;
+  LL_ASSIGN_OR_RETURN(out.traces, decode_earlier_argument(c.task.argument));
+  const auto held = [](const std::vector<ReuseItem>& items) {
+    std::vector<uint32_t> earlier;
+    for (const ReuseItem& item : items) {
+      earlier.push_back(item.why == ReuseItem::kHolds ? item.earlier : ReusedResults::kNone);
+    }
+    return earlier;
+  };
+  out.cells = held(reuse.cells);
+  out.probes = held(reuse.probes);
   return out;
 }
 
 absl::StatusOr<TaskOutput> run_plan(const Context& c) {
   const Plan& plan = c.session.plan();
+  LL_ASSIGN_OR_RETURN(const Reuse reuse, look_back(c));
   PlanSummary summary;
   summary.plan = c.session.plan_digest();
   summary.receivers = plan.receivers.all.size();
@@ -96,15 +118,24 @@ absl::StatusOr<TaskOutput> run_plan(const Context& c) {
   TaskOutput out;
   LL_ASSIGN_OR_RETURN(const Digest blob, c.put(encode_plan_summary(summary)));
   out.outputs.push_back(blob);
+  if (!c.task.argument.empty()) {
+    LL_ASSIGN_OR_RETURN(const ReusedResults reused, reused_results(c, reuse));
+    LL_ASSIGN_OR_RETURN(const Digest reused_blob, c.put(encode_reused_results(reused)));
+    out.outputs.push_back(reused_blob);
+  }
 
-  // Cells in the octree's order: neighbours share what a worker remembers.
+  // What an edit may have changed most comes first; among equals the octree's order, as neighbours share what a worker
+  // remembers.
   int64_t order = 0;
   const auto spawn = [&](const char* kind, uint32_t stage, uint32_t first, uint32_t count) {
     out.spawned.push_back({kind, stage, encode_argument({summary.plan, first, count}), order++});
   };
-  for (uint32_t i = 0; i < summary.cells; ++i) spawn("cell", 1, i, 1);
-  for (uint32_t i = 0; i < summary.probes; i += kRelightProbes) {
-    spawn("relight", 1, i, std::min(kRelightProbes, summary.probes - i));
+  for (const uint32_t i : dirty_first(reuse.cells)) spawn("cell", 1, i, 1);
+  for (uint32_t i = 0; i < summary.probes;) {
+    uint32_t end = i;
+    while (end < summary.probes && end - i < kRelightProbes && reuse.probes[end].why != ReuseItem::kHolds) ++end;
+    if (end > i) spawn("relight", 1, i, end - i);
+    i = std::max(end, i + 1);
   }
   for (uint32_t i = 0; i < summary.objects; i += kSurfaceObjects) {
     spawn("surfaces", 1, i, std::min(kSurfaceObjects, summary.objects - i));
@@ -127,15 +158,18 @@ absl::StatusOr<TaskOutput> run_cell(const Context& c) {
 
 absl::StatusOr<TaskOutput> run_relight(const Context& c) {
   const uint64_t rays = static_cast<uint64_t>(c.session.plan().params.relight_rays);
-  std::vector<ChunkRef> refs;
+  std::vector<RelightRecord> records;
   // One by one, to report each.
   for (uint32_t i = 0; i < c.argument.count; ++i) {
-    LL_ASSIGN_OR_RETURN(const auto one, c.session.relight(size_t{c.argument.first} + i, 1, c.sink(), c.control.cancel));
-    refs.push_back(one.front());
-    c.report(refs.size(), c.argument.count, refs.size() * rays);
+    LL_ASSIGN_OR_RETURN(auto one, c.session.relight(size_t{c.argument.first} + i, 1, c.sink(), c.control.cancel));
+    records.push_back(std::move(one.front()));
+    c.report(records.size(), c.argument.count, records.size() * rays);
   }
-  LL_ASSIGN_OR_RETURN(TaskOutput out, chunk_outputs(c, refs));
-  out.rays = refs.size() * rays;
+  TaskOutput out;
+  LL_ASSIGN_OR_RETURN(const Digest list, c.put(encode_relight_records(records)));
+  out.outputs.push_back(list);
+  for (const RelightRecord& r : records) out.outputs.push_back(r.chunk.digest);
+  out.rays = records.size() * rays;
   return out;
 }
 
@@ -147,7 +181,13 @@ absl::StatusOr<TaskOutput> run_surfaces(const Context& c) {
     refs.push_back(ref);
     c.report(refs.size(), c.argument.count, 0);
   }
-  return chunk_outputs(c, refs);
+  TaskOutput out;
+  LL_ASSIGN_OR_RETURN(const Digest list, c.put(encode_chunk_refs(refs)));
+  out.outputs.push_back(list);
+  for (const ChunkRef& ref : refs) {
+    if (ref.size > 0) out.outputs.push_back(ref.digest);
+  }
+  return out;
 }
 
 /// Puts what the tasks of stage 1 made in its place.
@@ -163,7 +203,7 @@ class Assembly {
         have_surface_(surfaces_.size()) {}
 
   absl::Status add(const FinishedTask& task) {
-    if (task.kind == "plan") return absl::OkStatus();
+    if (task.kind == "plan") return take_over(task);
     LL_ASSIGN_OR_RETURN(const TaskArgument argument, decode_argument(task.argument));
     if (argument.plan != c_.session.plan_digest())
       return bad("its task '" + printable(task.kind) + "' is another plan's");
@@ -174,23 +214,50 @@ class Assembly {
       LL_ASSIGN_OR_RETURN(CellRecord record, decode_cell_record(blob));
       return place<CellRecord>(task.kind, argument, {std::move(record)}, &cells_, &have_cell_);
     }
+    if (task.kind == "relight") {
+      LL_ASSIGN_OR_RETURN(auto records, decode_relight_records(blob));
+      return place(task.kind, argument, std::move(records), &relight_, &have_relight_);
+    }
     LL_ASSIGN_OR_RETURN(auto refs, decode_chunk_refs(blob));
-    if (task.kind == "relight") return place(task.kind, argument, std::move(refs), &relight_, &have_relight_);
     if (task.kind == "surfaces") return place(task.kind, argument, std::move(refs), &surfaces_, &have_surface_);
     return bad("it has a task of the unknown kind '" + printable(task.kind) + "'");
   }
 
-  absl::StatusOr<Manifest> finish() const {
+  absl::StatusOr<BakeSession::Finished> finish() {
     LL_RETURN_IF_ERROR(complete("cell", have_cell_));
     LL_RETURN_IF_ERROR(complete("relight", have_relight_));
     LL_RETURN_IF_ERROR(complete("surfaces", have_surface_));
-    return c_.session.manifest(cells_, relight_, surfaces_);
+    return c_.session.finish(std::move(cells_), std::move(relight_), surfaces_);
   }
 
  private:
   static absl::Status bad(const std::string& why) {
     return absl::InvalidArgumentError("cannot assemble from this task list: " + why +
                                       "; list every task of stage 1 once, with its outputs");
+  }
+
+  /// Results of an earlier bake that "plan" found to hold.
+  absl::Status take_over(const FinishedTask& plan) {
+    if (plan.outputs.size() < 2) return absl::OkStatus();
+    LL_ASSIGN_OR_RETURN(const auto blob, fetch(&c_.blobs, plan.outputs[1], "what 'plan' found to hold"));
+    LL_ASSIGN_OR_RETURN(const ReusedResults reused, decode_reused_results(blob));
+    LL_ASSIGN_OR_RETURN(BakeTraces earlier, fetch_traces(c_, reused.traces));
+    LL_RETURN_IF_ERROR(take_over("cell", reused.cells, std::move(earlier.cells), &cells_, &have_cell_));
+    return take_over("relight", reused.probes, std::move(earlier.probes), &relight_, &have_relight_);
+  }
+
+  template <class T>
+  static absl::Status take_over(const std::string& kind, const std::vector<uint32_t>& reused, std::vector<T> earlier,
+                                std::vector<T>* all, std::vector<bool>* have) {
+    if (reused.size() != all->size()) return bad("what 'plan' found to hold does not fit the plan");
+    for (size_t i = 0; i < reused.size(); ++i) {
+      if (reused[i] == ReusedResults::kNone) continue;
+      if (reused[i] >= earlier.size()) return bad("'plan' names a " + kind + " that the earlier bake does not have");
+      if ((*have)[i]) return bad("it has " + kind + " " + std::to_string(i) + " twice");
+      (*have)[i] = true;
+      (*all)[i] = std::move(earlier[reused[i]]);
+    }
+    return absl::OkStatus();
   }
 
   template <class T>
@@ -217,7 +284,8 @@ class Assembly {
 
   const Context& c_;
   std::vector<CellRecord> cells_;
-  std::vector<ChunkRef> relight_, surfaces_;
+  std::vector<RelightRecord> relight_;
+  std::vector<ChunkRef> surfaces_;
   std::vector<bool> have_cell_, have_relight_, have_surface_;
 };
 
@@ -230,10 +298,11 @@ absl::StatusOr<TaskOutput> run_assemble(const Context& c) {
     LL_RETURN_IF_ERROR(assembly.add(tasks[i]));
     c.report(i + 1, tasks.size(), 0);
   }
-  LL_ASSIGN_OR_RETURN(const Manifest manifest, assembly.finish());
+  LL_ASSIGN_OR_RETURN(const BakeSession::Finished finished, assembly.finish());
+  LL_ASSIGN_OR_RETURN(const Digest manifest, c.put(encode_manifest(finished.manifest)));
+  LL_ASSIGN_OR_RETURN(const Digest traces, c.put(encode_bake_traces(finished.traces)));
   TaskOutput out;
-  LL_ASSIGN_OR_RETURN(const Digest blob, c.put(encode_manifest(manifest)));
-  out.outputs.push_back(blob);
+  out.outputs = {manifest, traces};
   return out;
 }
 
@@ -256,7 +325,8 @@ absl::Status unknown_kind(std::string_view kind) {
 
 /// Of the task, checked against the worker's own plan: were they to differ, so would the outputs.
 absl::StatusOr<TaskArgument> argument_of(const BakeTask& task, const BakeSession& session) {
-  if (task.kind == "plan" || task.kind == "warm") {
+  if (task.kind == "plan") return TaskArgument{};  // it reads its own
+  if (task.kind == "warm") {
     if (task.argument.empty()) return TaskArgument{};
     return absl::InvalidArgumentError("task '" + task.kind + "' has an argument; submit it without one");
   }
@@ -276,7 +346,9 @@ struct TaskRunner::Warm {
   std::shared_ptr<const BakeSession> session;  // null while it is being made
 };
 
-SpawnedTask first_task() { return {"plan", 0, {}, 0}; }
+SpawnedTask first_task(const Digest* earlier) {
+  return {"plan", 0, earlier != nullptr ? encode_earlier_argument(*earlier) : std::vector<uint8_t>(), 0};
+}
 
 TaskRunner::TaskRunner(BlobAccess* blobs, uint64_t cache_bytes, Aside aside)
     : blobs_(*blobs),

@@ -1,11 +1,11 @@
 // The work of a bake farm: tasks as pure functions from bytes to named blobs. Whoever hands them out knows no method.
 //
-//   kind      stage  argument          outputs[0]       further outputs: the chunks that it names
-//   plan        0    empty             PlanSummary      -              asks for all other tasks
+//   kind      stage  argument          outputs[0]       further outputs
+//   plan        0    earlier traces    PlanSummary      ReusedResults  asks for all other tasks
 //   cell        1    one planned cell  CellRecord       its chunk
-//   relight     1    probes            chunk refs       one per probe
-//   surfaces    1    objects           chunk refs       one per object that has receivers
-//   assemble    2    -                 the manifest     -
+//   relight     1    probes            RelightRecords   the chunk of each
+//   surfaces    1    objects           chunk refs       the chunk of each object that has receivers
+//   assemble    2    -                 the manifest     the traces
 //   warm        -    empty             -                -              nobody asks for it: makes the session
 #pragma once
 
@@ -58,8 +58,9 @@ struct TaskOutput {
 /// Probes of one "relight" task, and objects of one "surfaces" task.
 inline constexpr uint32_t kRelightProbes = 16, kSurfaceObjects = 1024;
 
-/// The job's first task; it asks for the others.
-SpawnedTask first_task();
+/// The job's first task; it asks for the others. `earlier`, if any: the blob of an earlier bake's traces, whose results are
+/// used again where they hold.
+SpawnedTask first_task(const Digest* earlier = nullptr);
 
 /// Runs tasks. Thread-safe: tasks of one payload share a BakeSession, which the first of them makes while others wait.
 class TaskRunner {

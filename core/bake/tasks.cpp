@@ -5,9 +5,11 @@
 #include <map>
 
 #include "core/base/stopwatch.h"
+#include "core/base/version.h"
 #include "core/compression/clusters.h"
 #include "core/probes/links.h"
 #include "core/receivers/texel_opening.h"
+#include "core/trace/trace_recorder.h"
 
 namespace lightloom {
 namespace {
@@ -26,10 +28,70 @@ std::map<Id, uint32_t> enumerate(std::vector<Id> ids) {
   return slots;
 }
 
+/// Probes that each of the cell's receivers can read, nearest first, and all of them by their index in the plan, which is
+/// the order of their keys.
+struct Reach {
+  std::vector<std::vector<ProbeGrid::Near>> near;
+  std::map<uint32_t, uint32_t> slots;
+};
+
+Reach reach_of(const Plan& plan, const PlannedCell& cell) {
+  Reach out;
+  const ProbeGrid grid(plan.placement.probes, plan.params.spacing);
+  const bool sl17 = plan.params.method == BakeMethod::kSl17;
+  std::vector<uint32_t> reachable;
+  for (const uint32_t r : cell.receivers) {
+    const Vec3 x = plan.receivers.all[r].point.position;
+    out.near.push_back(sl17 ? grid.within(x, plan.placement.radius) : grid.nearest(x, plan.params.links + kFallbacks));
+    for (const auto& n : out.near.back()) reachable.push_back(n.probe);
+  }
+  out.slots = enumerate(std::move(reachable));
+  return out;
+}
+
+/// Which receivers read which probe follows from where both are; where their rays start, from their objects.
+Digest key_of(const Plan& plan, const Scene& scene, const PlannedCell& cell, const Reach& reach) {
+  Hasher h;
+  h.string("cell").string(kMethodVersion).bytes(&plan.params, sizeof plan.params);
+  h.value(plan.layout.mode).value(plan.placement.radius).value(cell.level).bytes(&cell.cell, sizeof cell.cell);
+  h.value(static_cast<uint64_t>(cell.receivers.size()));
+  uint32_t object = 0xffffffffu;
+  for (const uint32_t i : cell.receivers) {
+    const Receiver& r = plan.receivers.all[i];
+    if (r.object != object) {
+      object = r.object;
+      const LightmapUv& uv = plan.layout.uv[object];
+      h.digest(scene.objects[object].id).value(scene.objects[object].texel_scale).value(uv.width).value(uv.height);
+    }
+    const struct {
+      uint32_t key, parts;
+      Vec3 position;
+    } receiver{r.key, r.parts, r.point.position};
+    h.bytes(&receiver, sizeof receiver);
+  }
+  for (const auto& [index, slot] : reach.slots) {
+    const Probe& p = plan.placement.probes[index];
+    h.bytes(&p.cell, sizeof p.cell).value(p.slot).bytes(&p.position, sizeof p.position);
+  }
+  return h.finish();
+}
+
 }  // namespace
+
+Digest cell_key(const Plan& plan, const Scene& scene, const PlannedCell& cell) {
+  return key_of(plan, scene, cell, reach_of(plan, cell));
+}
+
+Digest relight_key(const Plan& plan, const Probe& probe) {
+  Hasher h;
+  h.string("relight").string(kMethodVersion).value(plan.params.relight_rays).value(plan.layout.mode);
+  h.bytes(&probe.cell, sizeof probe.cell).value(probe.slot).bytes(&probe.position, sizeof probe.position);
+  return h.finish();
+}
 
 CellTask make_cell_task(const Plan& plan, const Scene& scene, const PlannedCell& cell) {
   CellTask task;
+  task.grid = plan.grid;
   task.params = plan.params;
   task.seed = hash_combine(plan.params.seed, static_cast<uint64_t>(static_cast<uint32_t>(cell.level)));
   for (const int32_t i : cell.cell)
@@ -49,16 +111,10 @@ CellTask make_cell_task(const Plan& plan, const Scene& scene, const PlannedCell&
 
   // Probes in the plan's order, which is that of their keys.
   const auto& probes = plan.placement.probes;
-  const ProbeGrid grid(probes, plan.params.spacing);
-  std::vector<std::vector<ProbeGrid::Near>> near(cell.receivers.size());
-  std::vector<uint32_t> reachable;
   const bool sl17 = plan.params.method == BakeMethod::kSl17;
-  for (size_t i = 0; i < cell.receivers.size(); ++i) {
-    const Vec3 x = plan.receivers.all[cell.receivers[i]].point.position;
-    near[i] = sl17 ? grid.within(x, plan.placement.radius) : grid.nearest(x, plan.params.links + kFallbacks);
-    for (const auto& n : near[i]) reachable.push_back(n.probe);
-  }
-  const auto probe_slot = enumerate(std::move(reachable));
+  const Reach reach = reach_of(plan, cell);
+  const auto& [near, probe_slot] = reach;
+  task.key = key_of(plan, scene, cell, reach);
   for (const auto& [id, slot] : probe_slot) {
     task.probe_ids.push_back(id);
     task.probes.push_back(probes[id].position);
@@ -98,7 +154,9 @@ absl::StatusOr<CellResult> bake_cell(const RayTracer& tracer, VisibilityCache* c
   Matrix transport =
       Matrix::Zero(static_cast<Eigen::Index>(task.receivers.size()), static_cast<Eigen::Index>(task.probes.size()) * J);
   std::vector<Vec3> positions;
-  Gatherer gatherer(tracer, cache, {task.probes, task.probe_ids}, {task.params.order, task.params.rays, !sl17});
+  TraceRecorder recorder(task.grid, task.probes.size());
+  Gatherer gatherer(tracer, cache, {task.probes, task.probe_ids}, {task.params.order, task.params.rays, !sl17},
+                    &recorder);
   for (size_t r = 0; r < task.receivers.size(); ++r) {
     if (cancel != nullptr && cancel->cancelled()) return absl::CancelledError("bake of a cell cancelled");
     const std::span<float> row(transport.row(static_cast<Eigen::Index>(r)).data(),
@@ -107,6 +165,7 @@ absl::StatusOr<CellResult> bake_cell(const RayTracer& tracer, VisibilityCache* c
     positions.push_back(task.receivers[r].point.position);
     out.bounds.extend(positions.back());
   }
+  out.trace = recorder.finish(task.probes);
   out.transport_seconds = transport_watch.seconds();
 
   // Compression.
@@ -141,25 +200,32 @@ absl::StatusOr<CellResult> bake_cell(const RayTracer& tracer, VisibilityCache* c
   return out;
 }
 
-RelightChunk bake_relight(const RayTracer& tracer, const Plan& plan, const ReceiverSearch& receivers, Vec3 probe) {
+RelightResult bake_relight(const RayTracer& tracer, const Plan& plan, const ReceiverSearch& receivers, Vec3 probe) {
   const Scene& scene = tracer.scene();
   const uint32_t n = static_cast<uint32_t>(plan.params.relight_rays);
   RelightChunk out;
   out.position = probe;
+  TraceRecorder recorder(plan.grid, 0);
+  recorder.from({probe, probe});
 
   // Texel per ray, then numbered by the objects that were hit.
   std::vector<uint32_t> receiver(n, Receivers::kNone);
   out.rays.assign(n, RelightChunk::kDead);
   std::map<Digest, uint32_t> object_of;
   for (uint32_t i = 0; i < n; ++i) {
-    const Hit hit = tracer.closest(probe, sphere_direction(i, n));
+    const Vec3 direction = sphere_direction(i, n);
+    const Hit hit = tracer.closest(probe, direction);
     if (!hit) {
       out.rays[i] = RelightChunk::kSky;
+      recorder.sky(direction);
       continue;
     }
     const Object& object = scene.objects[hit.object];
-    if (hit.back && !scene.materials[object.triangles[hit.triangle].material].double_sided) continue;
-    receiver[i] = receivers.locate(hit);
+    float reach = 0;
+    if (!hit.back || scene.materials[object.triangles[hit.triangle].material].double_sided) {
+      receiver[i] = receivers.locate(hit, &reach);
+    }
+    recorder.hit(tracer.position(hit), reach);
     if (receiver[i] == Receivers::kNone) continue;
     const uint32_t o = plan.receivers.all[receiver[i]].object;
     object_of.try_emplace(scene.objects[o].id, o);
@@ -176,7 +242,7 @@ RelightChunk bake_relight(const RayTracer& tracer, const Plan& plan, const Recei
     const Receiver& r = plan.receivers.all[receiver[i]];
     out.rays[i] = base_of.at(r.object) + r.key;
   }
-  return out;
+  return {std::move(out), recorder.finish({})};
 }
 
 SurfaceChunk make_surface(const Plan& plan, const Scene& scene, uint32_t object) {

@@ -8,9 +8,16 @@
 #include "core/asset/chunk.h"
 #include "core/bake/plan.h"
 #include "core/receivers/receiver_search.h"
+#include "core/trace/trace.h"
 #include "core/transport/gather.h"
 
 namespace lightloom {
+
+/// Of all that a bake cell's result is computed from but what its rays meet: that is what its trace is of. Same key, and
+/// nothing changed along the trace: same bytes.
+Digest cell_key(const Plan& plan, const Scene& scene, const PlannedCell& cell);
+/// The same of a probe's relight set.
+Digest relight_key(const Plan& plan, const Probe& probe);
 
 /// Receivers of one bake cell, and the probes in their reach.
 struct CellTask {
@@ -21,6 +28,8 @@ struct CellTask {
   std::vector<Vec3> probes;
   std::vector<uint32_t> probe_ids;  ///< the plan's index of each probe
   uint64_t seed = 0;                ///< of the cell's level and coordinates
+  WorldGrid grid;
+  Digest key;
 };
 
 struct CellResult {
@@ -29,6 +38,7 @@ struct CellResult {
   GatherStats stats;
   double error = 0;
   Aabb bounds;
+  Trace trace;  ///< it reads geometry
   double transport_seconds = 0, compress_seconds = 0;  ///< thread time; not part of the result's bytes
 };
 
@@ -38,8 +48,12 @@ CellTask make_cell_task(const Plan& plan, const Scene& scene, const PlannedCell&
 absl::StatusOr<CellResult> bake_cell(const RayTracer& tracer, VisibilityCache* cache, const CellTask& task,
                                      const CancelFlag* cancel);
 
+struct RelightResult {
+  RelightChunk chunk;
+  Trace trace;  ///< it reads geometry and receivers
+};
 /// What the probe sees along its relight rays, as texels of the plan's receivers.
-RelightChunk bake_relight(const RayTracer& tracer, const Plan& plan, const ReceiverSearch& receivers, Vec3 probe);
+RelightResult bake_relight(const RayTracer& tracer, const Plan& plan, const ReceiverSearch& receivers, Vec3 probe);
 
 /// The receivers of one object.
 SurfaceChunk make_surface(const Plan& plan, const Scene& scene, uint32_t object);

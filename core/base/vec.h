@@ -2,7 +2,9 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 
 namespace lightloom {
@@ -42,6 +44,9 @@ inline Vec3 normalize(Vec3 a) {
   return l > 0 ? a / l : a;
 }
 inline bool is_finite(Vec3 a) { return std::isfinite(a.x) && std::isfinite(a.y) && std::isfinite(a.z); }
+
+/// Integer coordinates of a cell of the world grid: the cell covers [i, i+1)·side.
+using GridCell = std::array<int32_t, 3>;
 
 /// Axis-aligned box. Empty (lo > hi) until extended.
 struct Aabb {

@@ -16,7 +16,7 @@ namespace lightloom {
 /// Nearest-probe queries through the world grid. Keeps a reference to the probes.
 class ProbeGrid {
  public:
-  /// REQUIRES: probes sorted by key.
+  /// REQUIRES: probes sorted by name.
   ProbeGrid(std::span<const Probe> probes, float spacing);
 
   struct Near {

@@ -263,7 +263,7 @@ absl::StatusOr<PlacementResult> place_probes(const RayTracer& tracer, Receivers*
   result.repairs = repairs.size();
   result.probes.insert(result.probes.end(), repairs.begin(), repairs.end());
   std::sort(result.probes.begin(), result.probes.end(),
-            [](const Probe& a, const Probe& b) { return a.key() < b.key(); });
+            [](const Probe& a, const Probe& b) { return a.name() < b.name(); });
   return result;
 }
 

@@ -3,13 +3,12 @@
 // moves no probe far away (SL17 Sec. 4.1 thins global candidates instead, which any edit reshuffles).
 #pragma once
 
-#include <array>
 #include <cstdint>
-#include <utility>
 #include <vector>
 
 #include "core/base/parallel.h"
 #include "core/base/status.h"
+#include "core/probes/probe_name.h"
 #include "core/receivers/receivers.h"
 #include "core/scene/ray_tracer.h"
 
@@ -17,9 +16,9 @@ namespace lightloom {
 
 struct Probe {
   Vec3 position;
-  std::array<int32_t, 3> cell{};  ///< world cell of side `spacing`
-  uint32_t slot = 0;              ///< 0: base probe; 1 + octant: repair. SL17: a number
-  auto key() const { return std::pair(cell, slot); }
+  GridCell cell{};    ///< world cell of side `spacing`
+  uint32_t slot = 0;  ///< 0: base probe; 1 + octant: repair. SL17: a number
+  ProbeName name() const { return {cell, slot}; }
 };
 
 struct PlacementOptions {
@@ -28,7 +27,7 @@ struct PlacementOptions {
 };
 
 struct PlacementResult {
-  std::vector<Probe> probes;  ///< sorted by key
+  std::vector<Probe> probes;  ///< sorted by name
   double unseen = 0;   ///< share of test rays whose hit, or sky, no base probe in reach sees: what repair starts from
   size_t repairs = 0;  ///< probes added by repair
   float radius = 0;    ///< of every probe's support (SL17), metres; 0: receivers read their nearest probes

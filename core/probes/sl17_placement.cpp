@@ -62,7 +62,7 @@ std::vector<Probe> name_probes(const std::vector<Vec3>& points, float spacing) {
     const auto cell = probe_cell(p, spacing);
     out.push_back({p, cell, in_cell[cell]++});
   }
-  std::sort(out.begin(), out.end(), [](const Probe& a, const Probe& b) { return a.key() < b.key(); });
+  std::sort(out.begin(), out.end(), [](const Probe& a, const Probe& b) { return a.name() < b.name(); });
   return out;
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/base/check.h"
+#include "core/base/overlap.h"
 
 namespace lightloom {
 namespace {
@@ -12,24 +13,6 @@ constexpr int kMargin = 1;  // empty voxels around the level
 
 int32_t voxels_along(const Aabb& bounds, int axis, float side) {
   return static_cast<int32_t>(std::floor((bounds.hi[axis] - bounds.lo[axis]) / side)) + 1 + 2 * kMargin;
-}
-
-/// Separating axes of a triangle and a cube of half side h around the origin (Akenine-Möller 2001). Touching counts.
-bool overlaps(Vec3 a, Vec3 b, Vec3 c, float h) {
-  const auto separates = [&](Vec3 axis) {
-    const float pa = dot(axis, a), pb = dot(axis, b), pc = dot(axis, c);
-    const float reach = h * (std::abs(axis.x) + std::abs(axis.y) + std::abs(axis.z));
-    return std::min({pa, pb, pc}) > reach || std::max({pa, pb, pc}) < -reach;
-  };
-  const Vec3 edges[3] = {b - a, c - b, a - c};
-  if (separates(cross(edges[0], edges[1]))) return false;
-  for (const Vec3 unit : {Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}}) {
-    if (separates(unit)) return false;
-    for (const Vec3 edge : edges) {
-      if (separates(cross(unit, edge))) return false;
-    }
-  }
-  return true;
 }
 
 }  // namespace

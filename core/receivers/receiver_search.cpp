@@ -78,7 +78,11 @@ float ReceiverSearch::texel_of(uint32_t object, uint32_t triangle) const {
   return std::clamp(own, mean / kTexelSpread, mean * kTexelSpread);
 }
 
-uint32_t ReceiverSearch::locate(const Hit& hit) const {
+uint32_t ReceiverSearch::locate(const Hit& hit, float* reach) const {
+  const auto looked_at = [&](float metres) {
+    if (reach != nullptr) *reach = metres;
+  };
+  looked_at(0);
   const LightmapUv& uv = layout_.uv[hit.object];
   if (uv.corners.empty()) return Receivers::kNone;
   const ShadingPoint y = shading_point(scene_.objects[hit.object], hit.triangle, hit.b1, hit.b2, hit.back);
@@ -92,12 +96,14 @@ uint32_t ReceiverSearch::locate(const Hit& hit) const {
   const int py = std::clamp(static_cast<int>(std::floor(p.y)), 0, uv.height - 1);
   const uint32_t own =
       receivers_.find(hit.object, static_cast<uint32_t>(((hit.back ? uv.height : 0) + py) * uv.width + px));
+  looked_at(kOwnReach * texel);
   if (own != Receivers::kNone) {
     const Receiver& r = receivers_.all[own];
     if (faces_alike(r) && length(r.point.position - y.position) <= kOwnReach * texel) return own;
   }
 
   // The nearest one.
+  looked_at(kReach * texel);
   const float reach2 = kReach * texel * kReach * texel;
   const auto score = [&](uint32_t i) {
     const Receiver& r = receivers_.all[i];

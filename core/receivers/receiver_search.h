@@ -17,8 +17,8 @@ class ReceiverSearch {
   /// The receiver of the texel that the hit falls in, if it looks the same way from about the same place. A texel that
   /// several small charts share has one receiver for all, and texels in solids and dark cavities have none: then the
   /// nearest one that looks the same way, the hit's own object before others, within eight texels. Else
-  /// Receivers::kNone.
-  uint32_t locate(const Hit& hit) const;
+  /// Receivers::kNone. `reach`, if any, becomes a distance from the hit, metres: receivers farther away had no say.
+  uint32_t locate(const Hit& hit, float* reach = nullptr) const;
 
  private:
   struct Tree;

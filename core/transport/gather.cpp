@@ -34,8 +34,14 @@ GatherStats& GatherStats::operator+=(const GatherStats& o) {
   return *this;
 }
 
-Gatherer::Gatherer(const RayTracer& tracer, VisibilityCache* cache, GatherProbes probes, const GatherOptions& options)
-    : tracer_(tracer), cache_(cache), probes_(probes), options_(options), accumulator_(options.order) {}
+Gatherer::Gatherer(const RayTracer& tracer, VisibilityCache* cache, GatherProbes probes, const GatherOptions& options,
+                   TraceRecorder* recorder)
+    : tracer_(tracer),
+      cache_(cache),
+      recorder_(recorder),
+      probes_(probes),
+      options_(options),
+      accumulator_(options.order) {}
 
 Gatherer::Sample Gatherer::shoot(const GatherRay& ray) {
   ++stats_.gather_rays;
@@ -44,23 +50,28 @@ Gatherer::Sample Gatherer::shoot(const GatherRay& ray) {
   s.direction = ray.direction;
   if (!hit) {
     s.kind = Sample::kSky;
+    if (recorder_ != nullptr) s.place = recorder_->sky(ray.direction);
     return s;
   }
   const Scene& scene = tracer_.scene();
   const Object& object = scene.objects[hit.object];
-  // Single-sided back hits block and emit nothing.
-  if (hit.back && !scene.materials[object.triangles[hit.triangle].material].double_sided) return s;
   const ShadingPoint y = shading_point(object, hit.triangle, hit.b1, hit.b2, hit.back);
-  s.kind = Sample::kSurface;
-  s.position = y.position;
-  s.normal = y.geometric;
-  if (cache_ != nullptr) s.patch = cache_->patch_of(hit, y);
+  float reach = 0;
+  // Single-sided back hits block and emit nothing.
+  if (!hit.back || scene.materials[object.triangles[hit.triangle].material].double_sided) {
+    s.kind = Sample::kSurface;
+    s.position = y.position;
+    s.normal = y.geometric;
+    if (cache_ != nullptr) s.patch = cache_->patch_of(hit, y, &reach);
+  }
+  if (recorder_ != nullptr) s.place = recorder_->hit(y.position, reach);
   return s;
 }
 
 /// V_i(ω) and ψ_i(ω): whether the probe sees what the sample found, and in which direction.
 bool Gatherer::sees(uint32_t probe, const Sample& s, Vec3* psi) {
   const Vec3 p = probes_.positions[probe];
+  if (recorder_ != nullptr) recorder_->ask(s.place, probe);
   const bool sky = s.kind == Sample::kSky;
   auto verdict = VisibilityCache::kSplit;
   if (s.patch != VisibilityCache::kNoPatch) {
@@ -81,6 +92,11 @@ GatherStats Gatherer::add_row(const GatherPoint& receiver, std::span<float> row)
   LL_CHECK(!receiver.from.empty() && row.size() == probes_.positions.size() * J &&
            receiver.links <= receiver.near.size());
   stats_ = {};
+  if (recorder_ != nullptr) {
+    Aabb origin;
+    for (const ShadingPoint& from : receiver.from) origin.extend(from.position);
+    recorder_->from(origin);
+  }
 
   // Spatial weights w_i(x) (Eq. 10).
   const uint32_t near = static_cast<uint32_t>(receiver.near.size());

@@ -14,6 +14,7 @@
 #include "core/base/vec.h"
 #include "core/receivers/surface_point.h"
 #include "core/scene/ray_tracer.h"
+#include "core/trace/trace_recorder.h"
 #include "core/transport/sh_accumulator.h"
 #include "core/transport/visibility_cache.h"
 
@@ -61,8 +62,10 @@ struct GatherProbes {
 /// Works on one receiver after the other, with the memory of the last one.
 class Gatherer {
  public:
-  /// `cache` may be null: then a ray is traced for every hit and probe. Keeps references to the arguments.
-  Gatherer(const RayTracer& tracer, VisibilityCache* cache, GatherProbes probes, const GatherOptions& options);
+  /// `cache` may be null: then a ray is traced for every hit and probe. `recorder` may be null: then nobody asks where the
+  /// rays went. Keeps references to the arguments.
+  Gatherer(const RayTracer& tracer, VisibilityCache* cache, GatherProbes probes, const GatherOptions& options,
+           TraceRecorder* recorder = nullptr);
 
   /// α_x, added to `row`: row[i·J + j] for probe i of the cell, J = sh_count(order). E = α·λ.
   /// REQUIRES: row.size() = probes·J.
@@ -76,6 +79,7 @@ class Gatherer {
     Vec3 position;  ///< of the hit, pushed off, for kSurface
     Vec3 normal;
     Vec3 direction;  ///< of the ray
+    TraceRecorder::Place place = 0;
   };
   /// That a probe, by its place in `near`, sees the sample, and where.
   struct Sight {
@@ -89,6 +93,7 @@ class Gatherer {
 
   const RayTracer& tracer_;
   VisibilityCache* cache_;
+  TraceRecorder* recorder_;
   GatherProbes probes_;
   GatherOptions options_;
   GatherStats stats_;

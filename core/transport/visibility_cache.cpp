@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/base/octahedral.h"
 #include "core/base/rng.h"
 
 namespace lightloom {
@@ -47,7 +48,8 @@ VisibilityCache::~VisibilityCache() {
   for (auto& page : skies_) delete page.load(std::memory_order_relaxed);
 }
 
-VisibilityCache::Patch VisibilityCache::patch_of(const Hit& hit, const ShadingPoint& point) {
+VisibilityCache::Patch VisibilityCache::patch_of(const Hit& hit, const ShadingPoint& point, float* reach) {
+  if (reach != nullptr) *reach = 0;
   const Rows& rows = rows_[hit.object];
   if (rows.x.empty()) return kNoPatch;
   const auto& corner = layout_.uv[hit.object].corners[hit.triangle];
@@ -65,7 +67,9 @@ VisibilityCache::Patch VisibilityCache::patch_of(const Hit& hit, const ShadingPo
   Surface spare;
   const Surface& s = surface(patch, &spare);
   const Vec3 d = point.position - s.centre;
-  return dot(point.geometric, s.normal) >= kSameWay && dot(d, d) <= s.reach2 ? patch : kNoPatch;
+  if (dot(point.geometric, s.normal) < kSameWay || !(dot(d, d) <= s.reach2)) return kNoPatch;
+  if (reach != nullptr) *reach = 2 * std::sqrt(s.reach2);
+  return patch;
 }
 
 VisibilityCache::Verdict VisibilityCache::find(Patch patch, uint32_t probe, uint64_t* rays) {
@@ -80,18 +84,11 @@ VisibilityCache::Verdict VisibilityCache::find(Patch patch, uint32_t probe, uint
 }
 
 VisibilityCache::Verdict VisibilityCache::find_sky(Vec3 d, uint32_t probe, uint64_t* rays) {
-  // Octahedral map (Cigolle et al. 2014), onto [0, kSkySide)².
-  const float scale = 1 / (std::abs(d.x) + std::abs(d.y) + std::abs(d.z));
-  float u = d.x * scale, v = d.y * scale;
-  if (d.z < 0) {
-    const float folded = (1 - std::abs(v)) * (u < 0 ? -1.0f : 1.0f);
-    v = (1 - std::abs(u)) * (v < 0 ? -1.0f : 1.0f);
-    u = folded;
-  }
+  const Vec2 at = octahedral(d);
   const auto place = [](float x) {
     return std::min(kSkySide - 1, static_cast<uint32_t>(std::max(0.0f, (0.5f + 0.5f * x) * kSkySide)));
   };
-  const uint32_t cell = place(v) * kSkySide + place(u);
+  const uint32_t cell = place(at.y) * kSkySide + place(at.x);
   std::atomic<Sky*>& slot = skies_[probe];
   Sky* page = slot.load(std::memory_order_acquire);
   if (page == nullptr && bytes() + sizeof(Sky) <= budget_) page = publish(&slot, new Sky{});
@@ -191,13 +188,8 @@ VisibilityCache::Verdict VisibilityCache::trace_sky(uint32_t cell, uint32_t prob
     const Sample2 at = stratified(i, 2, &rng);
     const float u = 2 * (static_cast<float>(cell % kSkySide) + at.u) / kSkySide - 1;
     const float v = 2 * (static_cast<float>(cell / kSkySide) + at.v) / kSkySide - 1;
-    Vec3 d{u, v, 1 - std::abs(u) - std::abs(v)};
-    if (d.z < 0) {
-      d.x = (1 - std::abs(v)) * (u < 0 ? -1.0f : 1.0f);
-      d.y = (1 - std::abs(u)) * (v < 0 ? -1.0f : 1.0f);
-    }
     ++*rays;
-    seen += !tracer_.occluded(probes_[probe], d, std::numeric_limits<float>::infinity());
+    seen += !tracer_.occluded(probes_[probe], from_octahedral({u, v}), std::numeric_limits<float>::infinity());
     if (seen != 0 && seen != static_cast<int>(i) + 1) return kSplit;
   }
   return seen > 0 ? kSeen : kHidden;

@@ -35,7 +35,8 @@ class VisibilityCache {
   using Patch = uint32_t;
   static constexpr Patch kNoPatch = 0xffffffffu;
   /// The patch that the hit lies in; kNoPatch if the hit's surface has no texel, or one that stands for other surface.
-  Patch patch_of(const Hit& hit, const ShadingPoint& point);
+  /// `reach`, if any, becomes a distance from the point, metres, within which lie all the points that the patch is asked by.
+  Patch patch_of(const Hit& hit, const ShadingPoint& point, float* reach = nullptr);
 
   /// Of all sample points of a patch.
   enum Verdict : uint32_t { kUnknown, kHidden, kSeen, kSplit };

@@ -108,26 +108,29 @@ int run(int argc, char** argv) {
   for (const Probe& p : plan.placement.probes) probes.push_back(p.position);
   VisibilityCache cache(*tracer, plan.layout, plan.receivers.grids, probes);
   std::vector<GatherStats> stats(tasks.size());
+  std::atomic<uint64_t> trace_bytes{0};
   const Stopwatch watch;
   parallel_for(plan.cells.size(), {}, [&](uint64_t i) {
     const CellTask task = make_cell_task(plan, scene, plan.cells[i]);
+    TraceRecorder recorder(task.grid, task.probes.size());
     Gatherer gatherer(*tracer, cached ? &cache : nullptr, {task.probes, task.probe_ids},
-                      {params.order, plan.params.rays, !sl17});
+                      {params.order, plan.params.rays, !sl17}, &recorder);
     std::vector<float> row(task.probes.size() * static_cast<size_t>(sh_count(params.order)));
     for (const GatherPoint& receiver : task.receivers) {
       std::fill(row.begin(), row.end(), 0.0f);
       stats[i] += gatherer.add_row(receiver, row);
     }
+    trace_bytes += recorder.finish(task.probes).runs.size();
   });
   const double transport = watch.seconds();
   const double after = bare_seconds();
   GatherStats all;
   for (const GatherStats& s : stats) all += s;
   const double floor = 0.5 * (before + after);
-  std::printf("| %s | %zu | %zu | %.1f | %.1f | %.1f (%.1f, %.1f) | %.1f | %.2f | %.0f |\n", method.c_str(),
+  std::printf("| %s | %zu | %zu | %.1f | %.1f | %.1f (%.1f, %.1f) | %.1f | %.2f | %.0f | %.2f |\n", method.c_str(),
               plan.receivers.all.size(), plan.placement.probes.size(), 1e-6 * static_cast<double>(all.gather_rays),
               1e-6 * static_cast<double>(all.visibility_rays), floor, before, after, transport, transport / floor,
-              1e-6 * static_cast<double>(cache.bytes()));
+              1e-6 * static_cast<double>(cache.bytes()), 1e-6 * static_cast<double>(trace_bytes.load()));
   return 0;
 }
 
@@ -137,7 +140,7 @@ int run(int argc, char** argv) {
 int main(int argc, char** argv) {
   std::printf(
       "| method | receivers | probes | gather Mrays | visibility Mrays | bare loop s (before, after) | transport s | "
-      "ratio | cache MB |\n");
-  std::printf("|---|---|---|---|---|---|---|---|---|\n");
+      "ratio | cache MB | traces MB |\n");
+  std::printf("|---|---|---|---|---|---|---|---|---|---|\n");
   return lightloom::run(argc, argv);
 }

@@ -21,7 +21,9 @@ CellRecord record() {
   r.gather_rays = 1800;
   r.unseen = 7;
   r.error = 0.0125;
-  r.probe_ids = {2, 3, 17};
+  r.key = sha256("key");
+  r.trace = {{-1, {0, -4, 2}, {1, 2, 3}}, 7, {0x10, 0x35}};  // two cells that no ray crossed, four that some did
+  r.probes = {{{2, 0, 0}, 0}, {{3, 0, 0}, 0}, {{3, 0, 0}, 4}};
   r.clusters = {{{{-1, 0, 2}, {0, 1, 3}}, 30, 4, 3, 0.01f}, {{{0, 0, 2}, {1, 2, 3}}, 20, 1, 2, 0.02f}};
   r.coefficients = 30 * 4 + 20;
   r.bytes_projection = 1000;
@@ -29,8 +31,9 @@ CellRecord record() {
   return r;
 }
 // Offsets of the header's fields.
-constexpr size_t kProbes = 8, kClusters = 12, kChunkSize = 48, kLo = 56, kUnseen = 88, kError = 96, kCoefficients = 104,
-                 kBytesProjection = 112, kProbeIds = 128, kClusterList = 144;
+constexpr size_t kProbes = 8, kClusters = 12, kChunkSize = 80, kLo = 88, kUnseen = 120, kError = 128, kCoefficients = 136,
+                 kBytesProjection = 144, kProbeNames = 160, kClusterList = 208, kTrace = 288, kSky = kTrace + 28,
+                 kRunCount = kTrace + 32, kRuns = 336;
 
 TEST(CellRecord, RoundTrip) {
   const CellRecord in = record();
@@ -42,7 +45,9 @@ TEST(CellRecord, RoundTrip) {
   EXPECT_EQ(out->gather_rays, in.gather_rays);
   EXPECT_EQ(out->unseen, in.unseen);
   EXPECT_EQ(out->error, in.error);
-  EXPECT_EQ(out->probe_ids, in.probe_ids);
+  EXPECT_EQ(out->key, in.key);
+  EXPECT_EQ(out->trace, in.trace);
+  EXPECT_EQ(out->probes, in.probes);
   EXPECT_EQ(out->receivers(), 50u);
   ASSERT_EQ(out->clusters.size(), 2u);
   EXPECT_EQ(out->clusters[1].rank, 1u);
@@ -60,6 +65,7 @@ TEST(CellRecord, RefusesOtherLengthsAndCounts) {
   // Receivers, rank and probes of the first cluster: sums and sizes no longer fit.
   test::expect_count_checked(bytes, kClusterList + 24, decode_cell_record);
   test::expect_count_checked(bytes, kClusterList + 28, decode_cell_record);
+  test::expect_count_checked(bytes, kRunCount, decode_cell_record);
 }
 
 TEST(CellRecord, RefusesNumbersOutOfRange) {
@@ -79,10 +85,16 @@ TEST(CellRecord, RefusesNumbersOutOfRange) {
   EXPECT_THAT(error(with(bytes, kChunkSize, uint64_t{0})), HasSubstr("no chunk"));
   EXPECT_THAT(error(with(bytes, kCoefficients, uint64_t{139})), HasSubstr("coefficients"));
   EXPECT_THAT(error(with(bytes, kBytesProjection, ~uint64_t{0})), HasSubstr("larger"));
-  EXPECT_THAT(error(with(bytes, kProbeIds, 3u)), HasSubstr("ascend"));
+  EXPECT_THAT(error(with(bytes, kProbeNames, 3u)), HasSubstr("ascend"));
   EXPECT_THAT(error(with(bytes, kClusterList, kNan)), HasSubstr("cluster's bounds"));
   EXPECT_THAT(error(with(bytes, kClusterList + 32, 4u)), HasSubstr("more probes"));
   EXPECT_THAT(error(with(bytes, kClusterList + 36, kInf)), HasSubstr("cluster's error"));
+  EXPECT_THAT(error(with(bytes, kTrace, 61)), HasSubstr("grid"));
+  EXPECT_THAT(error(with(bytes, kTrace + 16, 0u)), HasSubstr("grid"));
+  EXPECT_THAT(error(with(bytes, kTrace + 16, 4096u)), HasSubstr("grid"));
+  EXPECT_THAT(error(with(bytes, kTrace + 16, 2u)), HasSubstr("does not cover its grid"));
+  EXPECT_THAT(error(with(bytes, kRuns, uint8_t{0x20})), HasSubstr("does not cover its grid"));
+  EXPECT_THAT(error(with(bytes, kSky, 16u)), HasSubstr("sky"));
 }
 
 TEST(CellRecord, AnyFlippedByteIsReadOrRefused) {

@@ -21,7 +21,7 @@ Cell cell_of(Vec3 p, float spacing) {
 }
 
 void sort_by_key(std::vector<Probe>* probes) {
-  std::sort(probes->begin(), probes->end(), [](const Probe& a, const Probe& b) { return a.key() < b.key(); });
+  std::sort(probes->begin(), probes->end(), [](const Probe& a, const Probe& b) { return a.name() < b.name(); });
 }
 
 std::vector<ProbeGrid::Near> brute_force(const std::vector<Probe>& probes, float spacing, Vec3 p, int count) {

@@ -34,8 +34,8 @@ TEST(Sl17Placement, AsManyAsARegularGrid) {
   EXPECT_EQ(placed.probes.size(), 4u * 3 * 5);
   EXPECT_EQ(placed.repairs, 0u);
   EXPECT_TRUE(std::is_sorted(placed.probes.begin(), placed.probes.end(),
-                             [](const Probe& a, const Probe& b) { return a.key() < b.key(); }));
-  for (size_t i = 1; i < placed.probes.size(); ++i) EXPECT_NE(placed.probes[i - 1].key(), placed.probes[i].key());
+                             [](const Probe& a, const Probe& b) { return a.name() < b.name(); }));
+  for (size_t i = 1; i < placed.probes.size(); ++i) EXPECT_NE(placed.probes[i - 1].name(), placed.probes[i].name());
 }
 
 TEST(Sl17Placement, ProbesStandInTheRoomAndNotInTheCrate) {

@@ -1,0 +1,63 @@
+#include "core/bake/reuse.h"
+
+#include <algorithm>
+#include <map>
+
+#include "core/bake/tasks.h"
+#include "core/trace/changes.h"
+
+namespace lightloom {
+namespace {
+
+template <class Record>
+std::map<Digest, uint32_t> by_key(const std::vector<Record>& records) {
+  std::map<Digest, uint32_t> out;
+  for (uint32_t i = 0; i < records.size(); ++i) out.emplace(records[i].key, i);
+  return out;
+}
+
+template <class Record>
+ReuseItem look_up(const Digest& key, const std::vector<Record>& earlier, const std::map<Digest, uint32_t>& index,
+                  const Changes& changes, Reads reads) {
+  const auto found = index.find(key);
+  if (found == index.end()) return {};
+  const double share = changes.share(earlier[found->second].trace, reads);
+  return {share > 0 ? ReuseItem::kCrossed : ReuseItem::kHolds, found->second, share};
+}
+
+}  // namespace
+
+absl::StatusOr<Reuse> find_reuse(const Plan& plan, const Scene& scene, const WorldContents& now,
+                                 const BakeTraces& earlier, const Parallel& parallel) {
+  const Changes changes(earlier.world, now);
+  const auto cells = by_key(earlier.cells), probes = by_key(earlier.probes);
+  const auto& planned = plan.placement.probes;
+  Reuse out;
+  out.changed_cells = changes.cells();
+  out.cells.resize(plan.cells.size());
+  out.probes.resize(planned.size());
+  const bool done = parallel_for(out.cells.size() + out.probes.size(), parallel, [&](uint64_t i) {
+    if (i < out.cells.size()) {
+      out.cells[i] =
+          look_up(cell_key(plan, scene, plan.cells[i]), earlier.cells, cells, changes, Reads::kGeometry);
+      return;
+    }
+    i -= out.cells.size();
+    out.probes[i] =
+        look_up(relight_key(plan, planned[i]), earlier.probes, probes, changes, Reads::kGeometryAndReceivers);
+  });
+  if (!done) return absl::CancelledError("cancelled while looking for what an edit has changed");
+  return out;
+}
+
+std::vector<uint32_t> dirty_first(std::span<const ReuseItem> items) {
+  std::vector<uint32_t> dirty;
+  for (uint32_t i = 0; i < items.size(); ++i) {
+    if (items[i].why != ReuseItem::kHolds) dirty.push_back(i);
+  }
+  std::stable_sort(dirty.begin(), dirty.end(),
+                   [&](uint32_t a, uint32_t b) { return items[a].share > items[b].share; });
+  return dirty;
+}
+
+}  // namespace lightloom

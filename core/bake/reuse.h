@@ -1,0 +1,40 @@
+// What of an earlier bake still holds after an edit, and what may not: by keys and traces, so by proof (docs/adr/0006).
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/bake/bake_traces.h"
+#include "core/bake/plan.h"
+
+namespace lightloom {
+
+/// What is known of one result of a plan.
+struct ReuseItem {
+  static constexpr uint32_t kNone = 0xffffffffu;
+  enum Why : uint8_t {
+    kHolds,    ///< the earlier result: the same would come out
+    kCrossed,  ///< rays crossed a cell of the world that has changed
+    kUnknown,  ///< no earlier result is of the same receivers, probes and parameters
+  };
+  Why why = kUnknown;
+  uint32_t earlier = kNone;  ///< its index in BakeTraces, unless kUnknown
+  /// Of its rays, that crossed what has changed: how much of its light may be another. 1 if that is not known.
+  double share = 1;
+};
+
+struct Reuse {
+  std::vector<ReuseItem> cells;   ///< by Plan::cells
+  std::vector<ReuseItem> probes;  ///< by PlacementResult::probes: their relight sets
+  uint64_t changed_cells = 0;     ///< of the world
+};
+
+/// `now`: contents of the plan's world. Error: cancellation.
+absl::StatusOr<Reuse> find_reuse(const Plan& plan, const Scene& scene, const WorldContents& now,
+                                 const BakeTraces& earlier, const Parallel& parallel);
+
+/// Indices of those that do not hold, the largest share first, and in the plan's order among equals.
+std::vector<uint32_t> dirty_first(std::span<const ReuseItem> items);
+
+}  // namespace lightloom
