@@ -3,8 +3,10 @@
 
 #include <nlohmann/json.hpp>
 
+#include <cmath>
 #include <cstdio>
 #include <memory>
+#include <optional>
 
 #include "cli/bake_options.h"
 #include "cli/command.h"
@@ -18,6 +20,7 @@
 #include "cli/print_json.h"
 #include "cli/progress.h"
 #include "core/bake/bake.h"
+#include "core/base/stopwatch.h"
 #include "core/base/text.h"
 
 namespace lightloom {
@@ -26,6 +29,7 @@ namespace {
 struct Options {
   std::string scene, output;
   BakeOptions how;
+  bool fresh = false, explain = false, dry_run = false;
   int threads = 0;
   FarmOptions farm;  // its server empty: on this machine
 };
@@ -35,6 +39,10 @@ uint64_t peak_memory() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
   return 1024 * static_cast<uint64_t>(usage.ru_maxrss);
+}
+
+double percent(uint64_t part, uint64_t of) {
+  return of > 0 ? 100.0 * static_cast<double>(part) / static_cast<double>(of) : 0;
 }
 
 /// What the asset says.
@@ -60,6 +68,8 @@ nlohmann::json asset_json(const BakeReport& r) {
 nlohmann::json to_json(const BakeReport& r) {
   nlohmann::json out = asset_json(r);
   out.update({{"clusters_reused", r.clusters_reused},
+              {"cells_reused", r.cells_reused},
+              {"probes_reused", r.probes_reused},
               {"rays_visibility", r.rays_visibility},
               {"seconds",
                {{"plan", r.seconds_plan},
@@ -93,13 +103,16 @@ void print_asset(const std::string& output, const BakeReport& r) {
 }
 
 void print_unseen(const BakeReport& r) {
-  std::printf("  unseen by any probe: %.4f %% of gather rays\n",
-              r.rays_gather > 0 ? 100.0 * static_cast<double>(r.unseen) / static_cast<double>(r.rays_gather) : 0.0);
+  std::printf("  unseen by any probe: %.4f %% of gather rays\n", percent(r.unseen, r.rays_gather));
 }
 
 void print(const std::string& output, const BakeReport& r) {
   print_asset(output, r);
-  const double rays = static_cast<double>(r.rays_gather + r.rays_visibility);
+  if (r.cells_reused > 0) {
+    std::printf("  %llu of the cells and %llu of the relight sets are the earlier bake's\n",
+                static_cast<unsigned long long>(r.cells_reused), static_cast<unsigned long long>(r.probes_reused));
+  }
+  const double rays = static_cast<double>(r.rays_gather - r.rays_gather_reused + r.rays_visibility);
   std::printf("  %s: plan %s, transport %s (%srays, %srays/s), compression %s\n",
               human_seconds(r.seconds_total).c_str(), human_seconds(r.seconds_plan).c_str(),
               human_seconds(r.seconds_transport).c_str(), human_count(rays).c_str(),
@@ -128,13 +141,16 @@ absl::Status check(Options* o) {
     if (o->threads != 0) {
       return absl::InvalidArgumentError("--threads is for bakes on this machine; each worker of a farm has its own");
     }
+    if (o->explain || o->dry_run) {
+      return absl::InvalidArgumentError("--explain and --dry-run are for bakes on this machine: leave out --server");
+    }
   }
   return OutputCheck({o->scene}).loom("-o", o->output);
 }
 
-absl::Status run_on_farm(const Options& o) {
+absl::Status run_on_farm(const Options& o, const BakeParams& params, const EarlierBake* earlier) {
   FarmClient farm = o.farm.connect();
-  LL_ASSIGN_OR_RETURN(const FarmBake baked, farm_bake(&farm, o.farm.server, o.scene, o.how.params, o.output));
+  LL_ASSIGN_OR_RETURN(const FarmBake baked, farm_bake(&farm, o.farm.server, o.scene, params, earlier, o.output));
   if (o.farm.json) {
     print_json(to_json(baked));
   } else {
@@ -143,10 +159,95 @@ absl::Status run_on_farm(const Options& o) {
   return absl::OkStatus();
 }
 
+/// What is to be done: cells and relight sets whose earlier results do not hold.
+class Outlook {
+ public:
+  Outlook(const BakeSession& session, const Reuse& reuse) : plan_(session.plan()), reuse_(reuse) {
+    for (const uint32_t i : dirty_first(reuse.cells)) {
+      receivers_ += plan_.cells[i].receivers.size();
+      ++cells_;
+    }
+    probes_ = dirty_first(reuse.probes).size();
+  }
+
+  nlohmann::json to_json(bool explain) const {
+    nlohmann::json out = {{"cells", plan_.cells.size()},
+                          {"cells_dirty", cells_},
+                          {"probes", plan_.placement.probes.size()},
+                          {"probes_dirty", probes_},
+                          {"receivers", plan_.receivers.all.size()},
+                          {"receivers_dirty", receivers_}};
+    if (!explain) return out;
+    out["dirty"] = nlohmann::json::array();
+    for (const uint32_t i : dirty_first(reuse_.cells)) {
+      const PlannedCell& cell = plan_.cells[i];
+      out["dirty"].push_back({{"level", cell.level},
+                              {"cell", cell.cell},
+                              {"receivers", cell.receivers.size()},
+                              {"why", why(reuse_.cells[i])},
+                              {"share", reuse_.cells[i].share}});
+    }
+    return out;
+  }
+
+  void print(bool explain) const {
+    std::printf("to bake: %zu of %zu cells (%.1f %% of the receivers), %zu of %zu relight sets\n", cells_,
+                plan_.cells.size(), percent(receivers_, plan_.receivers.all.size()), probes_,
+                plan_.placement.probes.size());
+    if (!explain) return;
+    for (const uint32_t i : dirty_first(reuse_.cells)) {
+      const PlannedCell& cell = plan_.cells[i];
+      const double side = std::ldexp(1.0, cell.level);
+      std::printf("  %g m cell at (%g, %g, %g), %zu receivers: %s\n", side, side * cell.cell[0], side * cell.cell[1],
+                  side * cell.cell[2], cell.receivers.size(), why(reuse_.cells[i]).c_str());
+    }
+  }
+
+ private:
+  static std::string why(const ReuseItem& item) {
+    if (item.why == ReuseItem::kUnknown) return "its receivers, its probes or the parameters are others";
+    char text[100];
+    std::snprintf(text, sizeof text, "up to %.2g %% of its rays pass where something has changed", 100 * item.share);
+    return text;
+  }
+
+  const Plan& plan_;
+  const Reuse& reuse_;
+  size_t cells_ = 0, probes_ = 0, receivers_ = 0;
+};
+
+absl::Status print_report(const Options& o, const BakeReport& report) {
+  if (o.farm.json) {
+    print_json(to_json(report));
+  } else {
+    print(o.output, report);
+  }
+  return absl::OkStatus();
+}
+
 absl::Status run(const Options& o) {
   cancel_on_interrupt();
-  if (!o.farm.server.empty()) return run_on_farm(o);
+  const Stopwatch watch;
   LL_ASSIGN_OR_RETURN(const Level level, load_level(o.scene));
+  const std::optional<EarlierBake> found = o.fresh ? std::nullopt : find_earlier_bake(o.output);
+  const EarlierBake* earlier = found ? &*found : nullptr;
+  const BakeParams params = o.how.params(earlier != nullptr ? &earlier->manifest.params : nullptr);
+  if (earlier != nullptr && !earlier->why_not.empty()) {
+    std::fprintf(stderr, "lightloom: %s is baked anew: %s\n", escape_controls(o.output).c_str(),
+                 earlier->why_not.c_str());
+  }
+  if (earlier != nullptr && !earlier->traces.empty() && !o.dry_run &&
+      is_up_to_date(earlier->manifest, *level.scene, params)) {
+    BakeReport report = report_of(earlier->manifest);
+    report.cells_reused = report.cells;
+    report.clusters_reused = report.clusters;
+    report.probes_reused = report.probes;
+    report.rays_gather_reused = report.rays_gather;
+    report.seconds_total = watch.seconds();
+    return print_report(o, report);
+  }
+  if (!o.farm.server.empty()) return run_on_farm(o, params, earlier);
+
   ProgressBar bar;
   BakeControl control;
   control.threads = o.threads;
@@ -154,14 +255,21 @@ absl::Status run(const Options& o) {
   control.progress = [&](const std::string& stage, uint64_t done, uint64_t total, uint64_t rays) {
     bar.update(stage, done, total, rays);
   };
-  LL_ASSIGN_OR_RETURN(const BakeReport report, local_bake(*level.tracer, o.how.params, o.output, control));
+  LocalBake bake{params, o.output, earlier, nullptr};
+  bake.planned = [&](const BakeSession& session, const Reuse& reuse) {
+    if (!o.explain && !o.dry_run) return true;
+    bar.finish();
+    const Outlook outlook(session, reuse);
+    if (o.farm.json && o.dry_run) {
+      print_json(outlook.to_json(o.explain));
+    } else if (!o.farm.json) {
+      outlook.print(o.explain);
+    }
+    return !o.dry_run;
+  };
+  LL_ASSIGN_OR_RETURN(const BakeReport report, local_bake(*level.tracer, bake, control));
   bar.finish();
-  if (o.farm.json) {
-    print_json(to_json(report));
-  } else {
-    print(o.output, report);
-  }
-  return absl::OkStatus();
+  return o.dry_run ? absl::OkStatus() : print_report(o, report);
 }
 
 }  // namespace
@@ -171,13 +279,16 @@ Command bake_command() {
   std::vector<Option> options = {{"SCENE", "level, .glb or .gltf", &o->scene, true},
                                  {"-o,--output", "OUT.loom, a folder", &o->output, true}};
   for (Option& option : o->how.options()) options.push_back(std::move(option));
+  options.push_back({"--fresh", "bake everything, by the parameters given here, whatever OUT.loom holds", &o->fresh});
+  options.push_back({"--dry-run", "bake nothing: print what there is to bake", &o->dry_run});
+  options.push_back({"--explain", "print why each cell is baked", &o->explain});
   options.push_back({"--threads", "0: one per hardware thread", &o->threads});
   Option server = o->farm.server_option(/*required=*/false);
   server.help += ", which bakes it; empty: this machine does";
   options.push_back(std::move(server));
   options.push_back(o->farm.timeout_option());
   options.push_back({"--json", "print the report as JSON", &o->farm.json});
-  return {"bake", "Bake a level into a .loom asset", std::move(options), [o] { return check(o.get()); },
+  return {"bake", "Bake a level into a .loom asset; if that is there, by its parameters, and only what has changed", std::move(options), [o] { return check(o.get()); },
           [o] { return run(*o); }};
 }
 

@@ -3,32 +3,47 @@
 namespace lightloom {
 
 std::vector<Option> BakeOptions::options() {
-  BakeParams& p = params;
-  return {{"--method", "default, or sl17: Silvennoinen & Lehtinen 2017 as published, to compare with", &method},
-          {"--spacing", "side of a probe cell, metres; 0: chosen from the level", &p.spacing},
-          {"--order", "spherical harmonics order of the probes, 0 to 9", &p.order},
-          {"--probes", "sl17: how many, instead of by --spacing; 0: by --spacing", &p.probes},
-          {"--links", "probes that each receiver reads; −1: 6 (sl17: 10 on average)", &links},
-          {"--rays", "gather rays per receiver, rounded up to a × b with a ≤ b ≤ 2a", &p.rays},
-          {"--relight-rays", "rays of each probe at run time; −1: 4096 (sl17: 8000)", &relight_rays},
-          {"--max-rank", "most coefficients of a cluster", &p.max_rank},
-          {"--threshold", "relative error at which a cluster's rank ends; −1: 0.02 (sl17: 0.005)", &threshold},
-          {"--cell-receivers", "a bake cell holds fewer receivers than this", &p.cell_receivers},
-          {"--texels-per-metre", "lightmap density; 0: chosen from the level", &p.texels_per_metre},
-          {"--lightmap-size", "side of the scene atlas, texels; 0: from the density", &p.lightmap_size},
-          {"--seed", "of all random numbers", &p.seed}};
+  return {{"--method", "default, or sl17: Silvennoinen & Lehtinen 2017 as published, to compare with", &method_},
+          {"--spacing", "side of a probe cell, metres [0: chosen from the level]", &spacing_},
+          {"--order", "spherical harmonics order of the probes, 0 to 9 [7]", &order_},
+          {"--probes", "sl17: how many, instead of by --spacing [0: by --spacing]", &probes_},
+          {"--links", "probes that each receiver reads [6; sl17: 10 on average]", &links_},
+          {"--rays", "gather rays per receiver, rounded up to a × b with a ≤ b ≤ 2a [256]", &rays_},
+          {"--relight-rays", "rays of each probe at run time [4096; sl17: 8000]", &relight_rays_},
+          {"--max-rank", "most coefficients of a cluster [32]", &max_rank_},
+          {"--threshold", "relative error at which a cluster's rank ends [0.02; sl17: 0.005]", &threshold_},
+          {"--cell-receivers", "a bake cell holds fewer receivers than this [1024]", &cell_receivers_},
+          {"--texels-per-metre", "lightmap density [0: chosen from the level]", &texels_per_metre_},
+          {"--lightmap-size", "side of the scene atlas, texels [0: from the density]", &lightmap_size_},
+          {"--seed", "of all random numbers [0]", &seed_}};
 }
 
-absl::Status BakeOptions::check() {
-  if (method != "default" && method != "sl17") {
+BakeParams BakeOptions::params(const BakeParams* earlier) const {
+  BakeParams p = method_ == "sl17" ? sl17_params() : BakeParams{};
+  if (earlier != nullptr && (method_.empty() || earlier->method == p.method)) p = *earlier;
+  const auto set = [](auto* value, const auto& given) {
+    if (given) *value = *given;
+  };
+  set(&p.spacing, spacing_);
+  set(&p.order, order_);
+  set(&p.probes, probes_);
+  set(&p.links, links_);
+  set(&p.rays, rays_);
+  set(&p.relight_rays, relight_rays_);
+  set(&p.max_rank, max_rank_);
+  set(&p.threshold, threshold_);
+  set(&p.cell_receivers, cell_receivers_);
+  set(&p.texels_per_metre, texels_per_metre_);
+  set(&p.lightmap_size, lightmap_size_);
+  set(&p.seed, seed_);
+  return p;
+}
+
+absl::Status BakeOptions::check() const {
+  if (!method_.empty() && method_ != "default" && method_ != "sl17") {
     return absl::InvalidArgumentError("--method must be default or sl17");
   }
-  const BakeParams of_method = method == "sl17" ? sl17_params() : BakeParams{};
-  params.method = of_method.method;
-  params.links = links == -1 ? of_method.links : links;
-  params.relight_rays = relight_rays == -1 ? of_method.relight_rays : relight_rays;
-  params.threshold = threshold == -1 ? of_method.threshold : threshold;
-  return check_params(params);
+  return check_params(params(nullptr));
 }
 
 }  // namespace lightloom

@@ -1,6 +1,7 @@
 // The options that say how a level is baked, for all commands that bake.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -9,15 +10,19 @@
 
 namespace lightloom {
 
-struct BakeOptions {
-  std::string method = "default";
-  BakeParams params;
-  int links = -1, relight_rays = -1;  // −1: the method's
-  float threshold = -1;
-
+class BakeOptions {
+ public:
   std::vector<Option> options();
-  /// Fills in what the method chooses, and checks it all.
-  absl::Status check();
+  /// Whether what was given is in range.
+  absl::Status check() const;
+  /// What was given; of the rest, what the earlier bake of this method had, or else the method's own. `earlier` may be null.
+  BakeParams params(const BakeParams* earlier) const;
+
+ private:
+  std::string method_;
+  std::optional<int> order_, probes_, links_, rays_, relight_rays_, max_rank_, cell_receivers_, lightmap_size_;
+  std::optional<float> spacing_, threshold_, texels_per_metre_;
+  std::optional<uint64_t> seed_;
 };
 
 }  // namespace lightloom

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
+#include <map>
 
+#include "cli/earlier_bake.h"
 #include "core/asset/asset.h"
 #include "core/bake/task_runner.h"
 #include "core/base/first_error.h"
@@ -143,8 +145,31 @@ absl::Status FarmClient::in_words(const absl::Status& status) const {
   return absl::Status(status.code(), server_ + ": " + std::string(status.message()));
 }
 
+absl::StatusOr<Digest> FarmClient::upload(std::span<const uint8_t> blob) {
+  auto digest = connection_->blobs.upload(blob);
+  if (!digest.ok()) return in_words(digest.status());
+  return digest;
+}
+
+absl::Status FarmClient::upload_chunks(const EarlierBake& earlier, std::vector<Digest>* inputs) const {
+  std::map<Digest, ChunkRef> chunks;
+  for (const ChunkRef& chunk : chunks_of(earlier.manifest)) chunks[chunk.digest] = chunk;
+  std::vector<Digest> digests;
+  for (const auto& [digest, chunk] : chunks) digests.push_back(digest);
+  const auto missing = connection_->blobs.find_missing(digests);
+  if (!missing.ok()) return in_words(missing.status());
+  const ChunkStore store = chunk_store(earlier.loom);
+  for (const Digest& digest : *missing) {
+    LL_ASSIGN_OR_RETURN(const auto bytes, store.get(chunks[digest]));
+    const auto sent = connection_->blobs.upload(bytes);
+    if (!sent.ok()) return in_words(sent.status());
+  }
+  inputs->insert(inputs->end(), digests.begin(), digests.end());
+  return absl::OkStatus();
+}
+
 absl::StatusOr<RemoteJob> FarmClient::submit(std::span<const uint8_t> scene, const BakeParams& params,
-                                             const std::string& name, int32_t priority,
+                                             const EarlierBake* earlier, const std::string& name, int32_t priority,
                                              const std::function<void(uint64_t)>& progress) {
   // Before the level goes up: a server that would refuse it.
   v1::ServerInfo info;
@@ -158,11 +183,19 @@ absl::StatusOr<RemoteJob> FarmClient::submit(std::span<const uint8_t> scene, con
   const auto digest = connection_->blobs.upload(scene, progress);
   if (!digest.ok()) return in_words(digest.status());
 
-  return submit(random_id(), encode_payload({*digest, params}), {*digest}, name, priority);
+  std::vector<Digest> inputs{*digest};
+  SpawnedTask first = first_task();
+  if (earlier != nullptr && !earlier->traces.empty()) {
+    LL_RETURN_IF_ERROR(upload_chunks(*earlier, &inputs));
+    LL_ASSIGN_OR_RETURN(const Digest traces, upload(earlier->traces));
+    inputs.push_back(traces);
+    first = first_task(&traces);
+  }
+  return submit(random_id(), encode_payload({*digest, params}), first, inputs, name, priority);
 }
 
 absl::StatusOr<RemoteJob> FarmClient::submit(const std::string& request_id, std::span<const uint8_t> payload,
-                                             const std::vector<Digest>& inputs, const std::string& name,
+                                             const SpawnedTask& first, const std::vector<Digest>& inputs, const std::string& name,
                                              int32_t priority) {
   v1::SubmitRequest request;
   request.set_request_id(request_id);
@@ -173,7 +206,6 @@ absl::StatusOr<RemoteJob> FarmClient::submit(const std::string& request_id, std:
   request.set_method_version(std::string(kMethodVersion));
   request.set_payload(payload.data(), payload.size());
   for (const Digest& input : inputs) request.add_inputs(to_bytes(input));
-  const SpawnedTask first = first_task();
   auto* task = request.add_tasks();
   task->set_kind(first.kind);
   task->set_stage(first.stage);

@@ -20,6 +20,8 @@ class Channel;
 namespace lightloom {
 
 class ChunkStore;
+struct EarlierBake;
+struct SpawnedTask;
 
 struct RemoteJob {
   uint64_t id = 0;
@@ -61,12 +63,16 @@ class FarmClient {
   FarmClient(std::shared_ptr<grpc::Channel> channel, std::string server);
   ~FarmClient();
 
-  /// A job of this payload, whose input blobs are there. The same request id again is the same job.
+  /// A job of this payload that begins with `first`, whose input blobs are there. The same request id again is the same job.
   absl::StatusOr<RemoteJob> submit(const std::string& request_id, std::span<const uint8_t> payload,
-                                   const std::vector<Digest>& inputs, const std::string& name, int32_t priority);
-  /// Uploads the level, unless it is there, and submits its bake. `progress`: bytes of `scene` that are there.
-  absl::StatusOr<RemoteJob> submit(std::span<const uint8_t> scene, const BakeParams& params, const std::string& name,
-                                   int32_t priority, const std::function<void(uint64_t)>& progress);
+                                   const SpawnedTask& first, const std::vector<Digest>& inputs, const std::string& name,
+                                   int32_t priority);
+  /// Uploads the level, unless it is there, and submits its bake. `progress`: bytes of `scene` that are there. Of the
+  /// earlier bake, if any, goes up what the farm lacks, since the new asset will name it.
+  absl::StatusOr<RemoteJob> submit(std::span<const uint8_t> scene, const BakeParams& params, const EarlierBake* earlier,
+                                   const std::string& name, int32_t priority,
+                                   const std::function<void(uint64_t)>& progress);
+  absl::StatusOr<Digest> upload(std::span<const uint8_t> blob);
   absl::StatusOr<RemoteJob> job(uint64_t id);
   absl::StatusOr<std::vector<RemoteJob>> jobs();
   absl::StatusOr<RemoteJob> cancel(uint64_t id);
@@ -86,6 +92,7 @@ class FarmClient {
   struct Connection;
   absl::Status fetch_chunks(const ChunkStore& store, const std::vector<ChunkRef>& chunks, const CancelFlag& cancel,
                             const std::function<void(uint64_t, uint64_t)>& progress) const;
+  absl::Status upload_chunks(const EarlierBake& earlier, std::vector<Digest>* inputs) const;
   absl::Status in_words(const absl::Status& status) const;
 
   std::string server_;

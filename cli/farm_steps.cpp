@@ -38,11 +38,11 @@ absl::Status check_farm_level(const std::string& scene) {
 }
 
 absl::StatusOr<RemoteJob> submit_level(FarmClient* farm, const std::string& scene, const BakeParams& params,
-                                       const std::string& name, int32_t priority) {
+                                       const EarlierBake* earlier, const std::string& name, int32_t priority) {
   LL_RETURN_IF_ERROR(load_level(scene).status());
   LL_ASSIGN_OR_RETURN(const std::vector<uint8_t> bytes, read_file(scene));
   ProgressBar bar;
-  return farm->submit(bytes, params, name.empty() ? std::filesystem::path(scene).stem().string() : name, priority,
+  return farm->submit(bytes, params, earlier, name.empty() ? std::filesystem::path(scene).stem().string() : name, priority,
                       [&](uint64_t there) { bar.update("upload", there, bytes.size()); });
 }
 
@@ -52,10 +52,10 @@ absl::StatusOr<Manifest> fetch_asset(FarmClient* farm, uint64_t job, const std::
 }
 
 absl::StatusOr<FarmBake> farm_bake(FarmClient* farm, const std::string& server, const std::string& scene,
-                                   const BakeParams& params, const std::string& loom) {
+                                   const BakeParams& params, const EarlierBake* earlier, const std::string& loom) {
   const Stopwatch watch;
   FarmBake out;
-  LL_ASSIGN_OR_RETURN(out.job, submit_level(farm, scene, params, "", 0));
+  LL_ASSIGN_OR_RETURN(out.job, submit_level(farm, scene, params, earlier, "", 0));
   const std::string id = std::to_string(out.job.id);
   {
     JobProgress progress(JobProgress::Output::kBar);

@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "cli/earlier_bake.h"
 #include "cli/farm_client.h"
 #include "core/bake/bake.h"
 
@@ -11,9 +12,9 @@ namespace lightloom {
 /// Before any work: there is such a level, and it is a .glb, which holds all of it.
 absl::Status check_farm_level(const std::string& scene);
 
-/// What is wrong with the level is said here, not by a worker. `name` empty: the level's.
+/// What is wrong with the level is said here, not by a worker. `name` empty: the level's. `earlier` may be null.
 absl::StatusOr<RemoteJob> submit_level(FarmClient* farm, const std::string& scene, const BakeParams& params,
-                                       const std::string& name, int32_t priority);
+                                       const EarlierBake* earlier, const std::string& name, int32_t priority);
 
 absl::StatusOr<Manifest> fetch_asset(FarmClient* farm, uint64_t job, const std::string& loom);
 
@@ -25,6 +26,6 @@ struct FarmBake {
 /// Bakes a level on the farm at `server` into the folder `loom`. An interrupt cancels the job; errors after its submission
 /// say where it stands.
 absl::StatusOr<FarmBake> farm_bake(FarmClient* farm, const std::string& server, const std::string& scene,
-                                   const BakeParams& params, const std::string& loom);
+                                   const BakeParams& params, const EarlierBake* earlier, const std::string& loom);
 
 }  // namespace lightloom

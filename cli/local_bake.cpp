@@ -67,14 +67,27 @@ absl::StatusOr<RemoteJob> run_job(RemoteJob job, FarmClient* client, std::shared
 
 }  // namespace
 
-absl::StatusOr<BakeReport> local_bake(const RayTracer& tracer, const BakeParams& params, const std::string& loom,
-                                      const BakeControl& control) {
+absl::StatusOr<BakeReport> local_bake(const RayTracer& tracer, const LocalBake& bake, const BakeControl& control) {
   const Stopwatch watch;
-  LL_ASSIGN_OR_RETURN(const std::shared_ptr<const BakeSession> session, BakeSession::create(tracer, params, control));
+  const std::string& loom = bake.loom;
+  LL_ASSIGN_OR_RETURN(const std::shared_ptr<const BakeSession> session,
+                      BakeSession::create(tracer, bake.params, control));
+  auto reuse = std::make_shared<const Reuse>(no_reuse(session->plan()));
+  const bool looks_back = bake.earlier != nullptr && !bake.earlier->traces.empty();
+  if (looks_back) {
+    const std::vector<uint8_t>& traces = bake.earlier->traces;
+    LL_ASSIGN_OR_RETURN(reuse, session->reuse(
+                                   sha256(traces), [&] { return decode_bake_traces(traces); }, control.stage("reuse")));
+  }
   const double seconds_plan = watch.seconds();
-  // The level is at hand: no blob holds it, and its hash stands for it. Equal payloads are one job.
-  const std::vector<uint8_t> payload = encode_payload({scene_hash(tracer.scene()), params});
-  const std::string request_id = sha256(payload).hex();
+  if (bake.planned && !bake.planned(*session, *reuse)) return BakeReport();
+
+  // The level is at hand: no blob holds it, and its hash stands for it. Equal payloads, after the same bake, are one job.
+  const std::vector<uint8_t> payload = encode_payload({scene_hash(tracer.scene()), bake.params});
+  Hasher request;
+  request.digest(sha256(payload));
+  if (looks_back) request.digest(sha256(bake.earlier->traces));
+  const std::string request_id = request.finish().hex();
 
   const std::string state = loom + ".partial";
   CoordinatorOptions options;
@@ -84,7 +97,14 @@ absl::StatusOr<BakeReport> local_bake(const RayTracer& tracer, const BakeParams&
   LL_ASSIGN_OR_RETURN(auto server, Server::start_in_process(info, farm.get()));
   FarmClient client(server->in_process_channel(), state);
   LL_ASSIGN_OR_RETURN(const std::vector<RemoteJob> earlier, client.jobs());
-  LL_ASSIGN_OR_RETURN(RemoteJob job, client.submit(request_id, payload, {}, loom, 0));
+  SpawnedTask first = first_task();
+  std::vector<Digest> inputs;
+  if (looks_back) {
+    LL_ASSIGN_OR_RETURN(const Digest traces, client.upload(bake.earlier->traces));
+    inputs.push_back(traces);
+    first = first_task(&traces);
+  }
+  LL_ASSIGN_OR_RETURN(RemoteJob job, client.submit(request_id, payload, first, inputs, loom, 0));
   for (const RemoteJob& other : earlier) {  // of another level, or other parameters
     if (other.id != job.id && !other.ended()) LL_RETURN_IF_ERROR(client.cancel(other.id).status());
   }
@@ -107,6 +127,7 @@ absl::StatusOr<BakeReport> local_bake(const RayTracer& tracer, const BakeParams&
   const CancelFlag never;
   LL_ASSIGN_OR_RETURN(const Manifest manifest, client.fetch(job.id, loom, never, [](uint64_t, uint64_t) {}));
   BakeReport report = report_of(manifest);
+  count_reused(*reuse, manifest, &report);
   add_times(*session, control.threads, &report);
   report.seconds_plan = seconds_plan;
   report.seconds_write = write_watch.seconds();

@@ -1,12 +1,14 @@
 // lightloom submit: a level's bake becomes a job of a farm.
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <nlohmann/json.hpp>
 
 #include "cli/bake_options.h"
 #include "cli/farm_command.h"
 #include "cli/farm_print.h"
 #include "cli/farm_steps.h"
+#include "cli/files.h"
 #include "cli/interrupt.h"
 #include "cli/print_json.h"
 
@@ -14,7 +16,7 @@ namespace lightloom {
 namespace {
 
 struct Options {
-  std::string scene, name;
+  std::string scene, name, from;
   std::shared_ptr<FarmOptions> farm = std::make_shared<FarmOptions>();
   BakeOptions how;
   int priority = 0;
@@ -22,13 +24,25 @@ struct Options {
 
 absl::Status check(Options* o) {
   LL_RETURN_IF_ERROR(o->how.check());
-  return check_farm_level(o->scene);
+  LL_RETURN_IF_ERROR(check_farm_level(o->scene));
+  return o->from.empty() ? absl::OkStatus() : check_loom(o->from);
 }
 
 absl::Status run(const Options& o) {
   cancel_on_interrupt();
+  std::optional<EarlierBake> earlier;
+  if (!o.from.empty()) {
+    earlier = find_earlier_bake(o.from);
+    if (!earlier || !earlier->why_not.empty()) {
+      return absl::FailedPreconditionError(o.from + " cannot be baked from: " +
+                                           (earlier ? earlier->why_not : "its manifest cannot be read") +
+                                           "; leave out --from");
+    }
+  }
   FarmClient farm = o.farm->connect();
-  LL_ASSIGN_OR_RETURN(const RemoteJob job, submit_level(&farm, o.scene, o.how.params, o.name, o.priority));
+  const BakeParams params = o.how.params(earlier ? &earlier->manifest.params : nullptr);
+  LL_ASSIGN_OR_RETURN(const RemoteJob job,
+                      submit_level(&farm, o.scene, params, earlier ? &*earlier : nullptr, o.name, o.priority));
   if (o.farm->json) {
     print_json(to_json(job));
   } else {
@@ -42,6 +56,8 @@ absl::Status run(const Options& o) {
 Command submit_command() {
   const auto o = std::make_shared<Options>();
   std::vector<Option> options = {{"SCENE", "level, .glb", &o->scene, true},
+                                 {"--from", "an earlier bake's .loom: by its parameters, and only what has changed",
+                                  &o->from},
                                  {"--name", "for people; empty: the level's", &o->name},
                                  {"--priority", "higher ones first", &o->priority}};
   for (Option& option : o->how.options()) options.push_back(std::move(option));

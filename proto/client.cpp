@@ -149,6 +149,25 @@ bool BlobClient::upload_together(const std::vector<std::vector<uint8_t>>& blobs)
   return writer->Finish().ok();
 }
 
+absl::StatusOr<std::vector<Digest>> BlobClient::find_missing(std::span<const Digest> digests) const {
+  constexpr size_t kMost = 8192;  // in one call
+  const auto stub = v1::BlobService::NewStub(channel_);
+  std::vector<Digest> missing;
+  for (; !digests.empty(); digests = digests.subspan(std::min(kMost, digests.size()))) {
+    v1::FindMissingRequest request;
+    for (const Digest& digest : digests.first(std::min(kMost, digests.size()))) request.add_digests(to_bytes(digest));
+    v1::FindMissingResponse response;
+    LL_RETURN_IF_ERROR(call_with_retries(patience_, [&](grpc::ClientContext* context) {
+      return stub->FindMissing(context, request, &response);
+    }));
+    for (const std::string& bytes : response.digests()) {
+      LL_ASSIGN_OR_RETURN(const Digest digest, to_digest(bytes));
+      missing.push_back(digest);
+    }
+  }
+  return missing;
+}
+
 absl::StatusOr<std::vector<uint8_t>> BlobClient::download(const Digest& digest) const {
   const auto stub = v1::BlobService::NewStub(channel_);
   std::vector<uint8_t> bytes;

@@ -49,6 +49,8 @@ class BlobClient {
                                 const std::function<void(uint64_t)>& progress = nullptr) const;
   /// Sends all of these: in one call, if none is large.
   absl::Status upload(const std::vector<std::vector<uint8_t>>& blobs) const;
+  /// Those that the server lacks. What it has is kept for a while after.
+  absl::StatusOr<std::vector<Digest>> find_missing(std::span<const Digest> digests) const;
   /// The blob, its digest checked. NotFound.
   absl::StatusOr<std::vector<uint8_t>> download(const Digest& digest) const;
 

@@ -37,6 +37,7 @@ void count_reused(const Reuse& reuse, const Manifest& m, BakeReport* report) {
     if (reuse.cells[i].why != ReuseItem::kHolds) continue;
     ++report->cells_reused;
     report->clusters_reused += m.cells[i].clusters;
+    report->rays_gather_reused += uint64_t{m.cells[i].receivers} * static_cast<uint64_t>(m.params.rays);
   }
   const auto holds = [](const ReuseItem& item) { return item.why == ReuseItem::kHolds; };
   report->probes_reused = static_cast<uint64_t>(std::count_if(reuse.probes.begin(), reuse.probes.end(), holds));
@@ -97,7 +98,7 @@ absl::StatusOr<BakeReport> bake(const RayTracer& tracer, const BakeParams& param
 
   std::vector<CellRecord> cells(plan.cells.size());
   std::vector<RelightRecord> relight(plan.placement.probes.size());
-  Reuse reuse{std::vector<ReuseItem>(cells.size()), std::vector<ReuseItem>(relight.size()), 0};
+  Reuse reuse = no_reuse(plan);
   if (earlier != nullptr) {
     LL_ASSIGN_OR_RETURN(reuse, find_reuse(plan, session->scene(), session->world(), *earlier, control.stage("reuse")));
     take_over(reuse.cells, earlier->cells, &cells);

@@ -13,6 +13,7 @@ namespace lightloom {
 
 struct BakeReport {
   uint64_t receivers = 0, probes = 0, repairs = 0, clusters = 0, cells = 0;
+  uint64_t rays_gather_reused = 0;  ///< of rays_gather
   uint64_t rays_gather = 0, rays_visibility = 0, rays_relight = 0, unseen = 0;
   double coefficients = 0;  ///< mean rank per receiver
   double seconds_total = 0, seconds_plan = 0;

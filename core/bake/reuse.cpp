@@ -27,6 +27,10 @@ ReuseItem look_up(const Digest& key, const std::vector<Record>& earlier, const s
 
 }  // namespace
 
+Reuse no_reuse(const Plan& plan) {
+  return {std::vector<ReuseItem>(plan.cells.size()), std::vector<ReuseItem>(plan.placement.probes.size()), 0};
+}
+
 absl::StatusOr<Reuse> find_reuse(const Plan& plan, const Scene& scene, const WorldContents& now,
                                  const BakeTraces& earlier, const Parallel& parallel) {
   const Changes changes(earlier.world, now);

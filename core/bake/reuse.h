@@ -30,6 +30,9 @@ struct Reuse {
   uint64_t changed_cells = 0;     ///< of the world
 };
 
+/// Of a bake that nothing went before.
+Reuse no_reuse(const Plan& plan);
+
 /// `now`: contents of the plan's world. Error: cancellation.
 absl::StatusOr<Reuse> find_reuse(const Plan& plan, const Scene& scene, const WorldContents& now,
                                  const BakeTraces& earlier, const Parallel& parallel);

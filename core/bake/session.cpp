@@ -168,6 +168,19 @@ const WorldContents& BakeSession::world() const {
   return world_;
 }
 
+absl::StatusOr<std::shared_ptr<const Reuse>> BakeSession::reuse(
+    const Digest& name, const std::function<absl::StatusOr<BakeTraces>()>& load, const Parallel& parallel) const {
+  {
+    const std::lock_guard lock(mutex_);
+    if (reuse_.second != nullptr && reuse_.first == name) return reuse_.second;
+  }
+  LL_ASSIGN_OR_RETURN(const BakeTraces earlier, load());
+  LL_ASSIGN_OR_RETURN(Reuse found, find_reuse(plan_, scene(), world(), earlier, parallel));
+  const std::lock_guard lock(mutex_);
+  reuse_ = {name, std::make_shared<const Reuse>(std::move(found))};
+  return reuse_.second;
+}
+
 absl::StatusOr<BakeSession::Finished> BakeSession::finish(std::vector<CellRecord> cells,
                                                           std::vector<RelightRecord> relight,
                                                           const std::vector<ChunkRef>& surfaces) const {

@@ -81,14 +81,12 @@ absl::StatusOr<BakeTraces> fetch_traces(const Context& c, const Digest& digest) 
 }
 
 /// What of the earlier bake, if the task names one, holds.
-absl::StatusOr<Reuse> look_back(const Context& c) {
+absl::StatusOr<std::shared_ptr<const Reuse>> look_back(const Context& c) {
   const Plan& plan = c.session.plan();
-  if (c.task.argument.empty()) {
-    return Reuse{std::vector<ReuseItem>(plan.cells.size()), std::vector<ReuseItem>(plan.placement.probes.size()), 0};
-  }
+  if (c.task.argument.empty()) return std::make_shared<const Reuse>(no_reuse(plan));
   LL_ASSIGN_OR_RETURN(const Digest digest, decode_earlier_argument(c.task.argument));
-  LL_ASSIGN_OR_RETURN(const BakeTraces earlier, fetch_traces(c, digest));
-  return find_reuse(plan, c.session.scene(), c.session.world(), earlier, c.control.stage("reuse"));
+  return c.session.reuse(
+      digest, [&] { return fetch_traces(c, digest); }, c.control.stage("reuse"));
 }
 
 absl::StatusOr<ReusedResults> reused_results(const Context& c, const Reuse& reuse) {
@@ -108,7 +106,7 @@ absl::StatusOr<ReusedResults> reused_results(const Context& c, const Reuse& reus
 
 absl::StatusOr<TaskOutput> run_plan(const Context& c) {
   const Plan& plan = c.session.plan();
-  LL_ASSIGN_OR_RETURN(const Reuse reuse, look_back(c));
+  LL_ASSIGN_OR_RETURN(const auto reuse, look_back(c));
   PlanSummary summary;
   summary.plan = c.session.plan_digest();
   summary.receivers = plan.receivers.all.size();
@@ -119,7 +117,7 @@ absl::StatusOr<TaskOutput> run_plan(const Context& c) {
   LL_ASSIGN_OR_RETURN(const Digest blob, c.put(encode_plan_summary(summary)));
   out.outputs.push_back(blob);
   if (!c.task.argument.empty()) {
-    LL_ASSIGN_OR_RETURN(const ReusedResults reused, reused_results(c, reuse));
+    LL_ASSIGN_OR_RETURN(const ReusedResults reused, reused_results(c, *reuse));
     LL_ASSIGN_OR_RETURN(const Digest reused_blob, c.put(encode_reused_results(reused)));
     out.outputs.push_back(reused_blob);
   }
@@ -130,10 +128,10 @@ absl::StatusOr<TaskOutput> run_plan(const Context& c) {
   const auto spawn = [&](const char* kind, uint32_t stage, uint32_t first, uint32_t count) {
     out.spawned.push_back({kind, stage, encode_argument({summary.plan, first, count}), order++});
   };
-  for (const uint32_t i : dirty_first(reuse.cells)) spawn("cell", 1, i, 1);
+  for (const uint32_t i : dirty_first(reuse->cells)) spawn("cell", 1, i, 1);
   for (uint32_t i = 0; i < summary.probes;) {
     uint32_t end = i;
-    while (end < summary.probes && end - i < kRelightProbes && reuse.probes[end].why != ReuseItem::kHolds) ++end;
+    while (end < summary.probes && end - i < kRelightProbes && reuse->probes[end].why != ReuseItem::kHolds) ++end;
     if (end > i) spawn("relight", 1, i, end - i);
     i = std::max(end, i + 1);
   }

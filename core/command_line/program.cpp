@@ -49,17 +49,26 @@ class Adder {
   void operator()(const SizeOption& value) { quantity(value.bytes, parse_size, value.preset, "SIZE"); }
   void operator()(const TimeOption& value) { quantity(value.seconds, parse_seconds, value.preset, "TIME"); }
   template <class Number>
+  void operator()(std::optional<Number>* value) {
+    number<Number>(value, "");
+  }
+  template <class Number>
   void operator()(Number* value) {
-    // CLI11 would take 010 for 8, and nan for a number.
-    const auto set = [value, shown = shown()](const std::string& text) { *value = parse<Number>(shown, text); };
     std::ostringstream preset;
     preset << *value;
-    text(set, preset.str(), std::is_floating_point_v<Number> ? "FLOAT" : std::is_signed_v<Number> ? "INT" : "UINT");
+    number<Number>(value, preset.str());
   }
 
  private:
   /// Without its short form.
   std::string shown() const { return option_.name.substr(option_.name.find(',') + 1); }
+
+  /// CLI11 would take 010 for 8, and nan for a number.
+  template <class Number, class Value>
+  void number(Value* value, const std::string& preset) {
+    const auto set = [value, shown = shown()](const std::string& text) { *value = parse<Number>(shown, text); };
+    text(set, preset, std::is_floating_point_v<Number> ? "FLOAT" : std::is_signed_v<Number> ? "INT" : "UINT");
+  }
 
   template <class T>
   void quantity(T* value, absl::StatusOr<T> (*parse)(std::string_view), const std::string& preset, const char* type) {

@@ -13,6 +13,14 @@
 namespace lightloom {
 namespace {
 
+#ifdef LIGHTLOOM_MANY_EDITS
+constexpr uint64_t kSeeds = 20;
+constexpr int kSequence = 20;
+#else
+constexpr uint64_t kSeeds = 4;
+constexpr int kSequence = 5;
+#endif
+
 BakeParams coarse() {
   BakeParams p;
   p.order = 2;
@@ -103,7 +111,7 @@ class Rebake : public ::testing::TestWithParam<Level> {};
 
 TEST_P(Rebake, RandomEditsGiveTheBytesOfAWholeBake) {
   uint64_t reused = 0;
-  for (uint64_t seed = 0; seed < 4; ++seed) {
+  for (uint64_t seed = 0; seed < kSeeds; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     Edited level(GetParam());
     Rng rng(hash_combine(seed, 0xed17));
@@ -116,7 +124,7 @@ TEST_P(Rebake, RandomEditsGiveTheBytesOfAWholeBake) {
 TEST_P(Rebake, ASequenceOfEditsGivesTheBytesOfAWholeBake) {
   Edited level(GetParam());
   Rng rng(0x5e9);
-  for (int i = 0; i < 5; ++i) {
+  for (int i = 0; i < kSequence; ++i) {
     SCOPED_TRACE("edit " + std::to_string(i));
     level.edit_and_compare(&rng);
   }

@@ -1,0 +1,26 @@
+// What a folder's asset knows of its bake: its parameters, and results that may still hold.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/asset/manifest.h"
+#include "core/scene/scene.h"
+
+namespace lightloom {
+
+struct EarlierBake {
+  std::string loom;
+  Manifest manifest;
+  std::vector<uint8_t> traces;  ///< encode_bake_traces(); empty: no result can be used again
+  std::string why_not;          ///< why the traces are empty
+};
+
+/// Nothing if there is no asset that this program can read: then the next bake knows nothing.
+std::optional<EarlierBake> find_earlier_bake(const std::string& loom);
+
+/// Whether a bake of the scene by these parameters would give the very same manifest: nothing that matters has changed.
+bool is_up_to_date(const Manifest& manifest, const Scene& scene, const BakeParams& params);
+
+}  // namespace lightloom
