@@ -30,6 +30,7 @@ struct Options {
   std::string scene, output;
   BakeOptions how;
   bool fresh = false, explain = false, dry_run = false;
+  float tolerance = 0;
   int threads = 0;
   FarmOptions farm;  // its server empty: on this machine
 };
@@ -70,6 +71,7 @@ nlohmann::json to_json(const BakeReport& r) {
   out.update({{"clusters_reused", r.clusters_reused},
               {"cells_reused", r.cells_reused},
               {"probes_reused", r.probes_reused},
+              {"stale", {{"cells", r.cells_stale}, {"share", r.stale}}},
               {"rays_visibility", r.rays_visibility},
               {"seconds",
                {{"plan", r.seconds_plan},
@@ -112,6 +114,10 @@ void print(const std::string& output, const BakeReport& r) {
     std::printf("  %llu of the cells and %llu of the relight sets are the earlier bake's\n",
                 static_cast<unsigned long long>(r.cells_reused), static_cast<unsigned long long>(r.probes_reused));
   }
+  if (r.stale > 0) {
+    std::printf("  %llu of the cells are stale, by up to %.2g %% of their light: bake without --tolerance to finish\n",
+                static_cast<unsigned long long>(r.cells_stale), 100 * r.stale);
+  }
   const double rays = static_cast<double>(r.rays_gather - r.rays_gather_reused + r.rays_visibility);
   std::printf("  %s: plan %s, transport %s (%srays, %srays/s), compression %s\n",
               human_seconds(r.seconds_total).c_str(), human_seconds(r.seconds_plan).c_str(),
@@ -133,6 +139,9 @@ void print(const std::string& output, const FarmBake& baked) {
 absl::Status check(Options* o) {
   LL_RETURN_IF_ERROR(o->how.check());
   LL_RETURN_IF_ERROR(check_threads(o->threads));
+  if (!(o->tolerance >= 0 && o->tolerance < 1)) {
+    return absl::InvalidArgumentError("--tolerance must be at least 0 and less than 1");
+  }
   if (o->farm.server.empty()) {
     LL_RETURN_IF_ERROR(check_input(o->scene));
   } else {
@@ -229,24 +238,26 @@ absl::Status run(const Options& o) {
   cancel_on_interrupt();
   const Stopwatch watch;
   LL_ASSIGN_OR_RETURN(const Level level, load_level(o.scene));
-  const std::optional<EarlierBake> found = o.fresh ? std::nullopt : find_earlier_bake(o.output);
-  const EarlierBake* earlier = found ? &*found : nullptr;
-  const BakeParams params = o.how.params(earlier != nullptr ? &earlier->manifest.params : nullptr);
-  if (earlier != nullptr && !earlier->why_not.empty()) {
+  std::optional<EarlierBake> earlier;
+  if (!o.fresh) earlier = find_earlier_bake(o.output);
+  const BakeParams params = o.how.params(earlier ? &earlier->manifest.params : nullptr);
+  if (earlier) earlier->tolerance = static_cast<double>(o.tolerance);
+  if (earlier && !earlier->why_not.empty()) {
     std::fprintf(stderr, "lightloom: %s is baked anew: %s\n", escape_controls(o.output).c_str(),
                  earlier->why_not.c_str());
   }
-  if (earlier != nullptr && !earlier->traces.empty() && !o.dry_run &&
+  if (earlier && !earlier->traces.empty() && earlier->stale <= earlier->tolerance && !o.dry_run &&
       is_up_to_date(earlier->manifest, *level.scene, params)) {
     BakeReport report = report_of(earlier->manifest);
     report.cells_reused = report.cells;
     report.clusters_reused = report.clusters;
     report.probes_reused = report.probes;
     report.rays_gather_reused = report.rays_gather;
+    report.stale = earlier->stale;
     report.seconds_total = watch.seconds();
     return print_report(o, report);
   }
-  if (!o.farm.server.empty()) return run_on_farm(o, params, earlier);
+  if (!o.farm.server.empty()) return run_on_farm(o, params, earlier ? &*earlier : nullptr);
 
   ProgressBar bar;
   BakeControl control;
@@ -255,7 +266,7 @@ absl::Status run(const Options& o) {
   control.progress = [&](const std::string& stage, uint64_t done, uint64_t total, uint64_t rays) {
     bar.update(stage, done, total, rays);
   };
-  LocalBake bake{params, o.output, earlier, nullptr};
+  LocalBake bake{params, o.output, earlier ? &*earlier : nullptr, nullptr};
   bake.planned = [&](const BakeSession& session, const Reuse& reuse) {
     if (!o.explain && !o.dry_run) return true;
     bar.finish();
@@ -280,6 +291,9 @@ Command bake_command() {
                                  {"-o,--output", "OUT.loom, a folder", &o->output, true}};
   for (Option& option : o->how.options()) options.push_back(std::move(option));
   options.push_back({"--fresh", "bake everything, by the parameters given here, whatever OUT.loom holds", &o->fresh});
+  options.push_back({"--tolerance",
+                     "keep cells of the earlier bake of whose light up to this share may have changed; 0: none",
+                     &o->tolerance});
   options.push_back({"--dry-run", "bake nothing: print what there is to bake", &o->dry_run});
   options.push_back({"--explain", "print why each cell is baked", &o->explain});
   options.push_back({"--threads", "0: one per hardware thread", &o->threads});

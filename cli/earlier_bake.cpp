@@ -8,6 +8,7 @@
 #include "core/asset/asset.h"
 #include "core/bake/bake_traces.h"
 #include "core/bake/plan.h"
+#include "core/bake/reuse.h"
 #include "core/base/version.h"
 
 namespace lightloom {
@@ -23,23 +24,28 @@ bool has_all_chunks(const EarlierBake& bake) {
   });
 }
 
+/// Fills in the traces, or says why they are of no use.
+absl::Status read_results(EarlierBake* bake) {
+  if (bake->manifest.method_version != kMethodVersion) {
+    return absl::FailedPreconditionError("it was baked by another version of the method");
+  }
+  auto traces = read_traces(bake->loom, bake->manifest);
+  if (!traces.ok()) return absl::NotFoundError("it has no traces");
+  const auto decoded = decode_bake_traces(*traces);
+  if (!decoded.ok()) return absl::DataLossError("its traces are damaged");
+  if (!has_all_chunks(*bake)) return absl::DataLossError("some of its chunks are missing");
+  bake->stale = stale_share(*decoded);
+  bake->traces = *std::move(traces);
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 std::optional<EarlierBake> find_earlier_bake(const std::string& loom) {
   auto manifest = read_manifest(loom);
   if (!manifest.ok()) return std::nullopt;
   EarlierBake bake{loom, *std::move(manifest), {}, ""};
-  if (bake.manifest.method_version != kMethodVersion) {
-    bake.why_not = "it was baked by another version of the method";
-  } else if (auto traces = read_traces(loom, bake.manifest); !traces.ok()) {
-    bake.why_not = "it has no traces";
-  } else if (!decode_bake_traces(*traces).ok()) {
-    bake.why_not = "its traces are damaged";
-  } else if (!has_all_chunks(bake)) {
-    bake.why_not = "some of its chunks are missing";
-  } else {
-    bake.traces = *std::move(traces);
-  }
+  if (const absl::Status status = read_results(&bake); !status.ok()) bake.why_not = std::string(status.message());
   return bake;
 }
 

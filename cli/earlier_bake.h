@@ -15,6 +15,8 @@ struct EarlierBake {
   Manifest manifest;
   std::vector<uint8_t> traces;  ///< encode_bake_traces(); empty: no result can be used again
   std::string why_not;          ///< why the traces are empty
+  double stale = 0;             ///< stale_share() of the traces
+  double tolerance = 0;         ///< up to which its results may be kept stale: the caller's choice
 };
 
 /// Nothing if there is no asset that this program can read: then the next bake knows nothing.

@@ -189,7 +189,8 @@ absl::StatusOr<RemoteJob> FarmClient::submit(std::span<const uint8_t> scene, con
     LL_RETURN_IF_ERROR(upload_chunks(*earlier, &inputs));
     LL_ASSIGN_OR_RETURN(const Digest traces, upload(earlier->traces));
     inputs.push_back(traces);
-    first = first_task(&traces);
+    const EarlierResults results{traces, earlier->tolerance};
+    first = first_task(&results);
   }
   return submit(random_id(), encode_payload({*digest, params}), first, inputs, name, priority);
 }

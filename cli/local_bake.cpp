@@ -73,21 +73,21 @@ absl::StatusOr<BakeReport> local_bake(const RayTracer& tracer, const LocalBake& 
   LL_ASSIGN_OR_RETURN(const std::shared_ptr<const BakeSession> session,
                       BakeSession::create(tracer, bake.params, control));
   auto reuse = std::make_shared<const Reuse>(no_reuse(session->plan()));
+  EarlierResults results;
   const bool looks_back = bake.earlier != nullptr && !bake.earlier->traces.empty();
   if (looks_back) {
-    const std::vector<uint8_t>& traces = bake.earlier->traces;
+    results = {sha256(bake.earlier->traces), bake.earlier->tolerance};
     LL_ASSIGN_OR_RETURN(reuse, session->reuse(
-                                   sha256(traces), [&] { return decode_bake_traces(traces); }, control.stage("reuse")));
+                                   results, [&] { return decode_bake_traces(bake.earlier->traces); },
+                                   control.stage("reuse")));
   }
   const double seconds_plan = watch.seconds();
   if (bake.planned && !bake.planned(*session, *reuse)) return BakeReport();
 
   // The level is at hand: no blob holds it, and its hash stands for it. Equal payloads, after the same bake, are one job.
   const std::vector<uint8_t> payload = encode_payload({scene_hash(tracer.scene()), bake.params});
-  Hasher request;
-  request.digest(sha256(payload));
-  if (looks_back) request.digest(sha256(bake.earlier->traces));
-  const std::string request_id = request.finish().hex();
+  const SpawnedTask first = looks_back ? first_task(&results) : first_task();
+  const std::string request_id = Hasher().digest(sha256(payload)).digest(sha256(first.argument)).finish().hex();
 
   const std::string state = loom + ".partial";
   CoordinatorOptions options;
@@ -97,12 +97,10 @@ absl::StatusOr<BakeReport> local_bake(const RayTracer& tracer, const LocalBake& 
   LL_ASSIGN_OR_RETURN(auto server, Server::start_in_process(info, farm.get()));
   FarmClient client(server->in_process_channel(), state);
   LL_ASSIGN_OR_RETURN(const std::vector<RemoteJob> earlier, client.jobs());
-  SpawnedTask first = first_task();
   std::vector<Digest> inputs;
   if (looks_back) {
-    LL_ASSIGN_OR_RETURN(const Digest traces, client.upload(bake.earlier->traces));
-    inputs.push_back(traces);
-    first = first_task(&traces);
+    LL_RETURN_IF_ERROR(client.upload(bake.earlier->traces).status());
+    inputs.push_back(results.traces);
   }
   LL_ASSIGN_OR_RETURN(RemoteJob job, client.submit(request_id, payload, first, inputs, loom, 0));
   for (const RemoteJob& other : earlier) {  // of another level, or other parameters

@@ -23,24 +23,18 @@ absl::Status cancelled(const std::filesystem::path& loom) {
                               (old ? " still holds the earlier bake, whole" : " holds no asset yet: bake again"));
 }
 
-template <class Record>
-void take_over(const std::vector<ReuseItem>& items, const std::vector<Record>& earlier, std::vector<Record>* records) {
-  for (size_t i = 0; i < items.size(); ++i) {
-    if (items[i].why == ReuseItem::kHolds) (*records)[i] = earlier[items[i].earlier];
-  }
-}
-
 }  // namespace
 
 void count_reused(const Reuse& reuse, const Manifest& m, BakeReport* report) {
   for (size_t i = 0; i < reuse.cells.size(); ++i) {
     if (reuse.cells[i].why != ReuseItem::kHolds) continue;
     ++report->cells_reused;
+    if (reuse.cells[i].share > 0) ++report->cells_stale;
+    report->stale = std::max(report->stale, reuse.cells[i].share);
     report->clusters_reused += m.cells[i].clusters;
     report->rays_gather_reused += uint64_t{m.cells[i].receivers} * static_cast<uint64_t>(m.params.rays);
   }
-  const auto holds = [](const ReuseItem& item) { return item.why == ReuseItem::kHolds; };
-  report->probes_reused = static_cast<uint64_t>(std::count_if(reuse.probes.begin(), reuse.probes.end(), holds));
+  for (const ReuseItem& probe : reuse.probes) report->probes_reused += probe.why == ReuseItem::kHolds;
 }
 
 BakeReport report_of(const Manifest& m) {
@@ -75,7 +69,7 @@ BakeReport report_of(const Manifest& m) {
 }
 
 absl::StatusOr<BakeReport> bake(const RayTracer& tracer, const BakeParams& params, const std::filesystem::path& loom,
-                                const BakeControl& control, const BakeTraces* earlier) {
+                                const BakeControl& control, const BakeTraces* earlier, double tolerance) {
   const Stopwatch watch;
   LL_ASSIGN_OR_RETURN(const auto session, BakeSession::create(tracer, params, control));
   const double seconds_plan = watch.seconds();
@@ -100,9 +94,15 @@ absl::StatusOr<BakeReport> bake(const RayTracer& tracer, const BakeParams& param
   std::vector<RelightRecord> relight(plan.placement.probes.size());
   Reuse reuse = no_reuse(plan);
   if (earlier != nullptr) {
-    LL_ASSIGN_OR_RETURN(reuse, find_reuse(plan, session->scene(), session->world(), *earlier, control.stage("reuse")));
-    take_over(reuse.cells, earlier->cells, &cells);
-    take_over(reuse.probes, earlier->probes, &relight);
+    LL_ASSIGN_OR_RETURN(reuse, find_reuse(plan, session->scene(), session->world(), *earlier, tolerance, control.stage("reuse")));
+    for (size_t i = 0; i < cells.size(); ++i) {
+      if (reuse.cells[i].why != ReuseItem::kHolds) continue;
+      cells[i] = earlier->cells[reuse.cells[i].earlier];
+      cells[i].stale = static_cast<float>(reuse.cells[i].share);
+    }
+    for (size_t i = 0; i < relight.size(); ++i) {
+      if (reuse.probes[i].why == ReuseItem::kHolds) relight[i] = earlier->probes[reuse.probes[i].earlier];
+    }
   }
 
   const std::vector<uint32_t> dirty_cells = dirty_first(reuse.cells);

@@ -21,8 +21,10 @@ struct Header {
   uint64_t gather_rays, unseen;
   double error;
   uint64_t coefficients, bytes_projection, bytes_reconstruction;
+  float stale;
+  uint32_t reserved;
 };
-static_assert(sizeof(Header) == 160 && sizeof(ClusterEntry) == 40 && sizeof(ChunkRef) == 40);
+static_assert(sizeof(Header) == 168 && sizeof(ClusterEntry) == 40 && sizeof(ChunkRef) == 40);
 
 absl::Status corrupt(std::string_view why) {
   return absl::DataLossError("cell record is corrupt: " + std::string(why) + "; run the cell's task again");
@@ -50,7 +52,7 @@ std::vector<uint8_t> encode_cell_record(const CellRecord& c) {
   ByteWriter w;
   w.value(Header{kMagic, kVersion, static_cast<uint32_t>(c.probes.size()), static_cast<uint32_t>(c.clusters.size()),
                  c.key, c.chunk, c.bounds.lo, c.bounds.hi, c.gather_rays, c.unseen, c.error, c.coefficients,
-                 c.bytes_projection, c.bytes_reconstruction});
+                 c.bytes_projection, c.bytes_reconstruction, c.stale, 0});
   w.array(c.probes);
   w.array(c.clusters);
   write_trace(c.trace, &w);
@@ -70,6 +72,7 @@ absl::StatusOr<CellRecord> decode_cell_record(std::span<const uint8_t> bytes) {
   if (!trace.ok()) return corrupt(std::string(trace.status().message()));
   c.trace = *std::move(trace);
   c.key = header.key;
+  c.stale = header.stale;
   c.chunk = header.chunk;
   c.bounds = {header.lo, header.hi};
   c.gather_rays = header.gather_rays;
@@ -83,6 +86,7 @@ absl::StatusOr<CellRecord> decode_cell_record(std::span<const uint8_t> bytes) {
   if (c.chunk.size == 0) return corrupt("it names no chunk");
   if (!valid_box(c.bounds)) return corrupt("its bounds are not finite or empty");
   if (!std::isfinite(c.error) || c.error < 0) return corrupt("its error is out of range");
+  if (!(c.stale >= 0 && c.stale <= 1)) return corrupt("its staleness is out of range");
   if (c.unseen > c.gather_rays) return corrupt("more rays are unseen than were shot");
   if (std::adjacent_find(c.probes.begin(), c.probes.end(), std::greater_equal<>()) != c.probes.end()) {
     return corrupt("its probes do not ascend");

@@ -24,6 +24,7 @@ struct CellRecord {
   uint64_t bytes_reconstruction = 0;   ///< of the chunk
   Digest key;                          ///< cell_key()
   Trace trace;                         ///< it reads geometry
+  float stale = 0;                     ///< see Reuse: 0 as it is baked
   std::vector<ProbeName> probes;       ///< that it reads, ascending
   std::vector<ClusterEntry> clusters;  ///< in the chunk's order
   uint64_t receivers() const;          ///< of all clusters

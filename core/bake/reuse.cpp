@@ -32,7 +32,7 @@ Reuse no_reuse(const Plan& plan) {
 }
 
 absl::StatusOr<Reuse> find_reuse(const Plan& plan, const Scene& scene, const WorldContents& now,
-                                 const BakeTraces& earlier, const Parallel& parallel) {
+                                 const BakeTraces& earlier, double tolerance, const Parallel& parallel) {
   const Changes changes(earlier.world, now);
   const auto cells = by_key(earlier.cells), probes = by_key(earlier.probes);
   const auto& planned = plan.placement.probes;
@@ -42,8 +42,11 @@ absl::StatusOr<Reuse> find_reuse(const Plan& plan, const Scene& scene, const Wor
   out.probes.resize(planned.size());
   const bool done = parallel_for(out.cells.size() + out.probes.size(), parallel, [&](uint64_t i) {
     if (i < out.cells.size()) {
-      out.cells[i] =
-          look_up(cell_key(plan, scene, plan.cells[i]), earlier.cells, cells, changes, Reads::kGeometry);
+      ReuseItem& item = out.cells[i];
+      item = look_up(cell_key(plan, scene, plan.cells[i]), earlier.cells, cells, changes, Reads::kGeometry);
+      if (item.why == ReuseItem::kUnknown) return;
+      item.share = std::min(1.0, item.share + static_cast<double>(earlier.cells[item.earlier].stale));
+      item.why = item.share > tolerance ? ReuseItem::kCrossed : ReuseItem::kHolds;
       return;
     }
     i -= out.cells.size();
@@ -52,6 +55,12 @@ absl::StatusOr<Reuse> find_reuse(const Plan& plan, const Scene& scene, const Wor
   });
   if (!done) return absl::CancelledError("cancelled while looking for what an edit has changed");
   return out;
+}
+
+double stale_share(const BakeTraces& traces) {
+  float most = 0;
+  for (const CellRecord& cell : traces.cells) most = std::max(most, cell.stale);
+  return static_cast<double>(most);
 }
 
 std::vector<uint32_t> dirty_first(std::span<const ReuseItem> items) {

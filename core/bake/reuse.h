@@ -14,13 +14,14 @@ namespace lightloom {
 struct ReuseItem {
   static constexpr uint32_t kNone = 0xffffffffu;
   enum Why : uint8_t {
-    kHolds,    ///< the earlier result: the same would come out
+    kHolds,    ///< the earlier result: the same would come out, or what may differ is within the tolerance
     kCrossed,  ///< rays crossed a cell of the world that has changed
     kUnknown,  ///< no earlier result is of the same receivers, probes and parameters
   };
   Why why = kUnknown;
   uint32_t earlier = kNone;  ///< its index in BakeTraces, unless kUnknown
-  /// Of its rays, that crossed what has changed: how much of its light may be another. 1 if that is not known.
+  /// Of its rays, that crossed what has changed since it was baked: how much of its light may be another. 1 if that is not
+  /// known. Above 0 although it holds: it is kept stale.
   double share = 1;
 };
 
@@ -33,9 +34,14 @@ struct Reuse {
 /// Of a bake that nothing went before.
 Reuse no_reuse(const Plan& plan);
 
-/// `now`: contents of the plan's world. Error: cancellation.
+/// `now`: contents of the plan's world. `tolerance`: the share up to which cells are kept although they may have changed; a
+/// later look back with less finds them. (Relight sets are cheap, and name what they see: they are never kept so.) Error:
+/// cancellation.
 absl::StatusOr<Reuse> find_reuse(const Plan& plan, const Scene& scene, const WorldContents& now,
-                                 const BakeTraces& earlier, const Parallel& parallel);
+                                 const BakeTraces& earlier, double tolerance, const Parallel& parallel);
+
+/// The largest share of a cell that was kept stale.
+double stale_share(const BakeTraces& traces);
 
 /// Indices of those that do not hold, the largest share first, and in the plan's order among equals.
 std::vector<uint32_t> dirty_first(std::span<const ReuseItem> items);

@@ -169,15 +169,16 @@ const WorldContents& BakeSession::world() const {
 }
 
 absl::StatusOr<std::shared_ptr<const Reuse>> BakeSession::reuse(
-    const Digest& name, const std::function<absl::StatusOr<BakeTraces>()>& load, const Parallel& parallel) const {
+    const EarlierResults& earlier, const std::function<absl::StatusOr<BakeTraces>()>& load,
+    const Parallel& parallel) const {
   {
     const std::lock_guard lock(mutex_);
-    if (reuse_.second != nullptr && reuse_.first == name) return reuse_.second;
+    if (reuse_.second != nullptr && reuse_.first == earlier) return reuse_.second;
   }
-  LL_ASSIGN_OR_RETURN(const BakeTraces earlier, load());
-  LL_ASSIGN_OR_RETURN(Reuse found, find_reuse(plan_, scene(), world(), earlier, parallel));
+  LL_ASSIGN_OR_RETURN(const BakeTraces traces, load());
+  LL_ASSIGN_OR_RETURN(Reuse found, find_reuse(plan_, scene(), world(), traces, earlier.tolerance, parallel));
   const std::lock_guard lock(mutex_);
-  reuse_ = {name, std::make_shared<const Reuse>(std::move(found))};
+  reuse_ = {earlier, std::make_shared<const Reuse>(std::move(found))};
   return reuse_.second;
 }
 

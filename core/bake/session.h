@@ -12,6 +12,7 @@
 #include "core/bake/plan.h"
 #include "core/bake/relight_record.h"
 #include "core/bake/reuse.h"
+#include "core/bake/task_blobs.h"
 #include "core/receivers/receiver_search.h"
 #include "core/transport/visibility_cache.h"
 
@@ -62,9 +63,9 @@ class BakeSession {
   Spent spent() const;
   /// What the level's cells of the world hold: what traces are compared by.
   const WorldContents& world() const;
-  /// What of an earlier bake holds; `name` is the digest of its encoded traces, `load` gives them. The last answer is
-  /// remembered. Errors: those of `load`, cancellation.
-  absl::StatusOr<std::shared_ptr<const Reuse>> reuse(const Digest& name,
+  /// What of an earlier bake holds: see find_reuse(). `load` gives its traces. The last answer is remembered. Errors: those
+  /// of `load`, cancellation.
+  absl::StatusOr<std::shared_ptr<const Reuse>> reuse(const EarlierResults& earlier,
                                                      const std::function<absl::StatusOr<BakeTraces>()>& load,
                                                      const Parallel& parallel) const;
   struct Finished {
@@ -95,7 +96,7 @@ class BakeSession {
   mutable WorldContents world_;  // once it is known
   mutable std::mutex mutex_;
   mutable Spent spent_;  // guarded by mutex_
-  mutable std::pair<Digest, std::shared_ptr<const Reuse>> reuse_;  // guarded by mutex_
+  mutable std::pair<EarlierResults, std::shared_ptr<const Reuse>> reuse_;  // guarded by mutex_
 };
 
 }  // namespace lightloom

@@ -46,6 +46,7 @@ struct RefsHeader {
 struct EarlierRecord {
   Tag tag;
   Digest traces;
+  double tolerance;
 };
 struct ReusedHeader {
   Tag tag;
@@ -53,7 +54,7 @@ struct ReusedHeader {
   uint32_t cells, probes;
 };
 static_assert(sizeof(BakeParams) == 56 && sizeof(PayloadRecord) == 104 && sizeof(ArgumentRecord) == 48 &&
-              sizeof(SummaryRecord) == 64 && sizeof(RefsHeader) == 16 && sizeof(EarlierRecord) == 40 && sizeof(ReusedHeader) == 48 && sizeof(ChunkRef) == 40);
+              sizeof(SummaryRecord) == 64 && sizeof(RefsHeader) == 16 && sizeof(EarlierRecord) == 48 && sizeof(ReusedHeader) == 48 && sizeof(ChunkRef) == 40);
 
 absl::Status corrupt(std::string_view what, std::string_view why) {
   return absl::InvalidArgumentError(std::string(what) + " is corrupt: " + std::string(why) +
@@ -118,13 +119,16 @@ absl::StatusOr<TaskArgument> decode_argument(std::span<const uint8_t> bytes) {
   return TaskArgument{record.plan, record.first, record.count};
 }
 
-std::vector<uint8_t> encode_earlier_argument(const Digest& traces) {
-  return write_record(EarlierRecord{{kEarlierMagic, kLayout}, traces});
+std::vector<uint8_t> encode_earlier_results(const EarlierResults& e) {
+  return write_record(EarlierRecord{{kEarlierMagic, kLayout}, e.traces, e.tolerance});
 }
 
-absl::StatusOr<Digest> decode_earlier_argument(std::span<const uint8_t> bytes) {
+absl::StatusOr<EarlierResults> decode_earlier_results(std::span<const uint8_t> bytes) {
   LL_ASSIGN_OR_RETURN(const auto record, read_record<EarlierRecord>("argument of plan", bytes, kEarlierMagic));
-  return record.traces;
+  if (!(record.tolerance >= 0 && record.tolerance <= 1)) {
+    return corrupt("argument of plan", "its tolerance is out of range");
+  }
+  return EarlierResults{record.traces, record.tolerance};
 }
 
 std::vector<uint8_t> encode_reused_results(const ReusedResults& reused) {
@@ -142,7 +146,8 @@ absl::StatusOr<ReusedResults> decode_reused_results(std::span<const uint8_t> byt
   ByteReader r(bytes);
   const auto header = r.value<ReusedHeader>();
   LL_RETURN_IF_ERROR(check_tag("list of reused results", header.tag, kReusedMagic));
-  ReusedResults reused{header.traces, r.array<uint32_t>(header.cells), r.array<uint32_t>(header.probes)};
+  ReusedResults reused{header.traces, r.array<ReusedResults::Item>(header.cells),
+                       r.array<ReusedResults::Item>(header.probes)};
   if (!r.at_end()) return corrupt("list of reused results", "its length does not match its counts");
   return reused;
 }

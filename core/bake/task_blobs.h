@@ -30,15 +30,25 @@ struct TaskArgument {
 std::vector<uint8_t> encode_argument(const TaskArgument& argument);
 absl::StatusOr<TaskArgument> decode_argument(std::span<const uint8_t> bytes);
 
-/// The argument of "plan" where an earlier bake may be used again: the blob of its encode_bake_traces(). Else it has none.
-std::vector<uint8_t> encode_earlier_argument(const Digest& traces);
-absl::StatusOr<Digest> decode_earlier_argument(std::span<const uint8_t> argument);
+/// The argument of "plan" where an earlier bake may be used again. Else it has none.
+struct EarlierResults {
+  Digest traces;         ///< blob of its encode_bake_traces()
+  double tolerance = 0;  ///< see find_reuse(); in [0, 1]
+  bool operator==(const EarlierResults&) const = default;
+};
+std::vector<uint8_t> encode_earlier_results(const EarlierResults& earlier);
+absl::StatusOr<EarlierResults> decode_earlier_results(std::span<const uint8_t> argument);
 
 /// Which results of an earlier bake "plan" found to hold: nobody is asked for them.
 struct ReusedResults {
-  static constexpr uint32_t kNone = 0xffffffffu;
-  Digest traces;                        ///< the earlier bake's
-  std::vector<uint32_t> cells, probes;  ///< for each that is planned: its index in the traces, or kNone
+  struct Item {
+    static constexpr uint32_t kNone = 0xffffffffu;
+    uint32_t earlier = kNone;  ///< index in the traces
+    float stale = 0;           ///< of a cell's record, from now on
+    bool operator==(const Item&) const = default;
+  };
+  Digest traces;                    ///< the earlier bake's
+  std::vector<Item> cells, probes;  ///< for each that is planned
   bool operator==(const ReusedResults&) const = default;
 };
 std::vector<uint8_t> encode_reused_results(const ReusedResults& reused);

@@ -84,20 +84,21 @@ absl::StatusOr<BakeTraces> fetch_traces(const Context& c, const Digest& digest) 
 absl::StatusOr<std::shared_ptr<const Reuse>> look_back(const Context& c) {
   const Plan& plan = c.session.plan();
   if (c.task.argument.empty()) return std::make_shared<const Reuse>(no_reuse(plan));
-  LL_ASSIGN_OR_RETURN(const Digest digest, decode_earlier_argument(c.task.argument));
+  LL_ASSIGN_OR_RETURN(const EarlierResults earlier, decode_earlier_results(c.task.argument));
   return c.session.reuse(
-      digest, [&] { return fetch_traces(c, digest); }, c.control.stage("reuse"));
+      earlier, [&] { return fetch_traces(c, earlier.traces); }, c.control.stage("reuse"));
 }
 
 absl::StatusOr<ReusedResults> reused_results(const Context& c, const Reuse& reuse) {
   ReusedResults out;
-  LL_ASSIGN_OR_RETURN(out.traces, decode_earlier_argument(c.task.argument));
+  LL_ASSIGN_OR_RETURN(const EarlierResults earlier, decode_earlier_results(c.task.argument));
+  out.traces = earlier.traces;
   const auto held = [](const std::vector<ReuseItem>& items) {
-    std::vector<uint32_t> earlier;
-    for (const ReuseItem& item : items) {
-      earlier.push_back(item.why == ReuseItem::kHolds ? item.earlier : ReusedResults::kNone);
+    std::vector<ReusedResults::Item> out(items.size());
+    for (size_t i = 0; i < items.size(); ++i) {
+      if (items[i].why == ReuseItem::kHolds) out[i] = {items[i].earlier, static_cast<float>(items[i].share)};
     }
-    return earlier;
+    return out;
   };
   out.cells = held(reuse.cells);
   out.probes = held(reuse.probes);
@@ -216,8 +217,10 @@ class Assembly {
       LL_ASSIGN_OR_RETURN(auto records, decode_relight_records(blob));
       return place(task.kind, argument, std::move(records), &relight_, &have_relight_);
     }
-    LL_ASSIGN_OR_RETURN(auto refs, decode_chunk_refs(blob));
-    if (task.kind == "surfaces") return place(task.kind, argument, std::move(refs), &surfaces_, &have_surface_);
+    if (task.kind == "surfaces") {
+      LL_ASSIGN_OR_RETURN(auto refs, decode_chunk_refs(blob));
+      return place(task.kind, argument, std::move(refs), &surfaces_, &have_surface_);
+    }
     return bad("it has a task of the unknown kind '" + printable(task.kind) + "'");
   }
 
@@ -241,19 +244,22 @@ class Assembly {
     LL_ASSIGN_OR_RETURN(const ReusedResults reused, decode_reused_results(blob));
     LL_ASSIGN_OR_RETURN(BakeTraces earlier, fetch_traces(c_, reused.traces));
     LL_RETURN_IF_ERROR(take_over("cell", reused.cells, std::move(earlier.cells), &cells_, &have_cell_));
+    for (size_t i = 0; i < cells_.size(); ++i) {
+      if (reused.cells[i].earlier != ReusedResults::Item::kNone) cells_[i].stale = reused.cells[i].stale;
+    }
     return take_over("relight", reused.probes, std::move(earlier.probes), &relight_, &have_relight_);
   }
 
   template <class T>
-  static absl::Status take_over(const std::string& kind, const std::vector<uint32_t>& reused, std::vector<T> earlier,
-                                std::vector<T>* all, std::vector<bool>* have) {
+  static absl::Status take_over(const std::string& kind, const std::vector<ReusedResults::Item>& reused,
+                                std::vector<T> earlier, std::vector<T>* all, std::vector<bool>* have) {
     if (reused.size() != all->size()) return bad("what 'plan' found to hold does not fit the plan");
     for (size_t i = 0; i < reused.size(); ++i) {
-      if (reused[i] == ReusedResults::kNone) continue;
-      if (reused[i] >= earlier.size()) return bad("'plan' names a " + kind + " that the earlier bake does not have");
+      if (reused[i].earlier == ReusedResults::Item::kNone) continue;
+      if (reused[i].earlier >= earlier.size()) return bad("'plan' names a " + kind + " that the earlier bake does not have");
       if ((*have)[i]) return bad("it has " + kind + " " + std::to_string(i) + " twice");
       (*have)[i] = true;
-      (*all)[i] = std::move(earlier[reused[i]]);
+      (*all)[i] = std::move(earlier[reused[i].earlier]);
     }
     return absl::OkStatus();
   }
@@ -344,8 +350,8 @@ struct TaskRunner::Warm {
   std::shared_ptr<const BakeSession> session;  // null while it is being made
 };
 
-SpawnedTask first_task(const Digest* earlier) {
-  return {"plan", 0, earlier != nullptr ? encode_earlier_argument(*earlier) : std::vector<uint8_t>(), 0};
+SpawnedTask first_task(const EarlierResults* earlier) {
+  return {"plan", 0, earlier != nullptr ? encode_earlier_results(*earlier) : std::vector<uint8_t>(), 0};
 }
 
 TaskRunner::TaskRunner(BlobAccess* blobs, uint64_t cache_bytes, Aside aside)

@@ -1,7 +1,7 @@
 // The work of a bake farm: tasks as pure functions from bytes to named blobs. Whoever hands them out knows no method.
 //
 //   kind      stage  argument          outputs[0]       further outputs
-//   plan        0    earlier traces    PlanSummary      ReusedResults  asks for all other tasks
+//   plan        0    earlier results   PlanSummary      ReusedResults  asks for all other tasks
 //   cell        1    one planned cell  CellRecord       its chunk
 //   relight     1    probes            RelightRecords   the chunk of each
 //   surfaces    1    objects           chunk refs       the chunk of each object that has receivers
@@ -58,9 +58,8 @@ struct TaskOutput {
 /// Probes of one "relight" task, and objects of one "surfaces" task.
 inline constexpr uint32_t kRelightProbes = 16, kSurfaceObjects = 1024;
 
-/// The job's first task; it asks for the others. `earlier`, if any: the blob of an earlier bake's traces, whose results are
-/// used again where they hold.
-SpawnedTask first_task(const Digest* earlier = nullptr);
+/// The job's first task; it asks for the others. `earlier`, if any, has results that are used again where they hold.
+SpawnedTask first_task(const EarlierResults* earlier = nullptr);
 
 /// Runs tasks. Thread-safe: tasks of one payload share a BakeSession, which the first of them makes while others wait.
 class TaskRunner {

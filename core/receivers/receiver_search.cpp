@@ -96,14 +96,16 @@ uint32_t ReceiverSearch::locate(const Hit& hit, float* reach) const {
   const int py = std::clamp(static_cast<int>(std::floor(p.y)), 0, uv.height - 1);
   const uint32_t own =
       receivers_.find(hit.object, static_cast<uint32_t>(((hit.back ? uv.height : 0) + py) * uv.width + px));
-  looked_at(kOwnReach * texel);
   if (own != Receivers::kNone) {
     const Receiver& r = receivers_.all[own];
-    if (faces_alike(r) && length(r.point.position - y.position) <= kOwnReach * texel) return own;
+    const float distance = length(r.point.position - y.position);
+    if (faces_alike(r) && distance <= kOwnReach * texel) {
+      looked_at(distance);
+      return own;
+    }
   }
 
   // The nearest one.
-  looked_at(kReach * texel);
   const float reach2 = kReach * texel * kReach * texel;
   const auto score = [&](uint32_t i) {
     const Receiver& r = receivers_.all[i];
@@ -121,6 +123,8 @@ uint32_t ReceiverSearch::locate(const Hit& hit, float* reach) const {
   Best<decltype(score), decltype(before)> best{score, before, reach2};
   const float at[3] = {y.position.x, y.position.y, y.position.z};
   tree_->index.findNeighbors(best, at, nanoflann::SearchParams());
+  // A score is no less than the squared distance. Its own receiver, were it there, would be nearer than this.
+  looked_at(std::max(std::sqrt(best.least), kOwnReach * texel));
   return best.receiver;
 }
 

@@ -90,7 +90,7 @@ class FarmTest : public testing::Test {
 
   RemoteJob submit(int priority = 0) {
     FarmClient client(address());
-    return value_or_die(client.submit(scene_, params_, "cornell", priority, [](uint64_t) {}));
+    return value_or_die(client.submit(scene_, params_, nullptr, "cornell", priority, [](uint64_t) {}));
   }
   RemoteJob watch(
       uint64_t id, const std::function<void(const RemoteJob&)>& changed = [](const RemoteJob&) {}) {

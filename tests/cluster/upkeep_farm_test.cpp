@@ -34,7 +34,7 @@ class UpkeepFarm : public FarmTest {
   }
   absl::Status submit_status() {
     FarmClient client(address());
-    return client.submit(scene_, params_, "cornell", 0, [](uint64_t) {}).status();
+    return client.submit(scene_, params_, nullptr, "cornell", 0, [](uint64_t) {}).status();
   }
   /// Over a connection of its own, as another process.
   Garbage gc(int64_t grace_seconds) {

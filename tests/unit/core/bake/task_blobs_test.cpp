@@ -48,6 +48,10 @@ TEST(TaskBlobs, RoundTrip) {
   EXPECT_EQ(*decode_plan_summary(encode_plan_summary(summary)), summary);
   const std::vector<ChunkRef> refs{{sha256("a"), 1}, {}, {sha256("b"), 2}};
   EXPECT_EQ(*decode_chunk_refs(encode_chunk_refs(refs)), refs);
+  const EarlierResults earlier{sha256("traces"), 0.25};
+  EXPECT_EQ(*decode_earlier_results(encode_earlier_results(earlier)), earlier);
+  const ReusedResults reused{sha256("traces"), {{3, 0.5f}, {}}, {{0, 0}}};
+  EXPECT_EQ(*decode_reused_results(encode_reused_results(reused)), reused);
 }
 
 TEST(TaskBlobs, RefuseOtherLengths) {
@@ -58,6 +62,12 @@ TEST(TaskBlobs, RefuseOtherLengths) {
   test::expect_exact_length(refs, decode_chunk_refs);
   test::expect_count_checked(refs, 8, decode_chunk_refs);
   test::expect_count_checked(refs, 12, decode_chunk_refs);
+  test::expect_exact_length(encode_earlier_results({}), decode_earlier_results);
+  EXPECT_FALSE(decode_earlier_results(with(encode_earlier_results({}), 40, 1.5)).ok()) << "a tolerance is a share";
+  const auto reused = encode_reused_results({{}, {{3, 0.5f}, {}}, {{0, 0}}});
+  test::expect_exact_length(reused, decode_reused_results);
+  test::expect_count_checked(reused, 40, decode_reused_results);
+  test::expect_count_checked(reused, 44, decode_reused_results);
 }
 
 TEST(TaskBlobs, PayloadRefusesBadParametersAndOtherMethods) {

@@ -127,20 +127,59 @@ TEST_F(TaskRunnerTest, ShuffledOverTwoRunnersIsTheBakeByteForByte) {
 
   inputs_ = blobs_.put_one(encode_task_list(finished));
   const TaskOutput assembled = value_or_die(other.run(task(last)));
-  ASSERT_EQ(assembled.outputs.size(), 1u);
+  ASSERT_EQ(assembled.outputs.size(), 2u);
   const auto manifest_bytes = value_or_die(blobs_.get(assembled.outputs.front()));
   EXPECT_EQ(manifest_bytes, value_or_die(read_file(loom / "manifest")));
 
   const ChunkStore store = chunk_store(loom);
   const Manifest manifest = value_or_die(decode_manifest(manifest_bytes));
-  std::vector<ChunkRef> chunks;
-  for (const CellEntry& c : manifest.cells) chunks.push_back(c.chunk);
-  for (const ProbeEntry& p : manifest.probes) chunks.push_back(p.relight);
-  for (const ObjectEntry& o : manifest.objects) chunks.push_back(o.surface);
-  for (const ChunkRef& ref : chunks) {
-    if (ref.size == 0) continue;
+  EXPECT_EQ(value_or_die(blobs_.get(assembled.outputs.back())), value_or_die(read_traces(loom, manifest)));
+  for (const ChunkRef& ref : chunks_of(manifest)) {
     EXPECT_EQ(value_or_die(blobs_.get(ref.digest)), value_or_die(store.get(ref)));
   }
+}
+
+TEST_F(TaskRunnerTest, AnEditRunsFewerTasksForTheSameManifest) {
+  BakeParams quick = tiny();
+  quick.rays = 4;
+  quick.max_rank = 1;
+  // All tasks of a plan; the manifest's blob and that of the traces.
+  const auto bake_all = [&](const SpawnedTask& first, size_t* tasks) {
+    const TaskOutput planned = value_or_die(runner_.run(task(first, quick)));
+    std::vector<FinishedTask> finished{{"plan", first.argument, planned.outputs}};
+    for (const SpawnedTask& t : planned.spawned) {
+      if (t.stage == 2) inputs_ = blobs_.put_one(encode_task_list(finished));
+      finished.push_back({t.kind, t.argument, value_or_die(runner_.run(task(t, quick))).outputs});
+    }
+    *tasks = finished.size();
+    return finished.back().outputs;
+  };
+  size_t all = 0, none = 0, some = 0, anew = 0;
+  const auto before = bake_all(first_task(), &all);
+  const EarlierResults earlier{before[1]};
+  EXPECT_EQ(bake_all(first_task(&earlier), &none), before);
+  EXPECT_LT(none, all / 2) << "plan, surfaces, assembly, and probes that no cell reads: of those nothing is kept";
+
+  Scene scene = value_or_die(load_gltf(folder_.path() / "cornell.glb"));
+  Object& moved = scene.objects.back();
+  moved.transform[12] += 0.05;
+  for (Vec3& p : moved.positions) p.x += 0.05f;
+  ASSERT_TRUE(save_gltf(scene, folder_.path() / "edited.glb").ok());
+  scene_ = blobs_.put_one(value_or_die(read_file(folder_.path() / "edited.glb")));
+  const auto rebaked = bake_all(first_task(&earlier), &some);
+  EXPECT_EQ(rebaked[0], bake_all(first_task(), &anew)[0]);
+  EXPECT_NE(rebaked[0], before[0]);
+  EXPECT_LE(some, anew);
+
+  // What is kept stale is on record, and done anew by who tolerates less.
+  size_t tolerant = 0, finishing = 0;
+  const EarlierResults lenient{before[1], 1};
+  const auto stale = bake_all(first_task(&lenient), &tolerant);
+  EXPECT_LT(tolerant, some);
+  EXPECT_GT(stale_share(value_or_die(decode_bake_traces(value_or_die(blobs_.get(stale[1]))))), 0);
+  const EarlierResults from_stale{stale[1]};
+  EXPECT_EQ(bake_all(first_task(&from_stale), &finishing)[0], rebaked[0]);
+  EXPECT_GT(finishing, 3u);
 }
 
 TEST_F(TaskRunnerTest, WhatATaskMakesGoesOutTogether) {
@@ -280,7 +319,7 @@ TEST_F(TaskRunnerTest, RefusesWhatItCannotRun) {
   EXPECT_THAT(error(with_argument("surfaces", 99, 1, digest), kOutOfRange), HasSubstr("no object 99"));
   EXPECT_THAT(error(with_argument("cell", 0, 1, sha256("another")), kFailedPrecondition), HasSubstr("plans the bake"));
   EXPECT_THAT(error(task({"cell", 1, {}, 0}), kInvalidArgument), HasSubstr("task argument is corrupt"));
-  EXPECT_THAT(error(task({"plan", 0, {1}, 0}), kInvalidArgument), HasSubstr("has an argument"));
+  EXPECT_THAT(error(task({"plan", 0, {1}, 0}), kInvalidArgument), HasSubstr("argument of plan is corrupt"));
 }
 
 TEST_F(TaskRunnerTest, AssembleRefusesListsThatDoNotFit) {
@@ -302,7 +341,9 @@ TEST_F(TaskRunnerTest, AssembleRefusesListsThatDoNotFit) {
   EXPECT_THAT(assemble({{"cell", cell.argument, {}}}, kInvalidArgument), HasSubstr("no outputs"));
   EXPECT_THAT(assemble({{"cell", cell.argument, {sha256("gone")}}}, kNotFound), HasSubstr("what 'cell' gave"));
   EXPECT_THAT(assemble({{"cell", cell.argument, relight_0.outputs}}, kDataLoss), HasSubstr("cell record is corrupt"));
-  EXPECT_THAT(assemble({{"surfaces", cell.argument, relight_0.outputs}}, kInvalidArgument), HasSubstr("does not fit"));
+  EXPECT_THAT(assemble({{"relight", cell.argument, relight_0.outputs}}, kInvalidArgument), HasSubstr("does not fit"));
+  EXPECT_THAT(assemble({{"surfaces", cell.argument, relight_0.outputs}}, kInvalidArgument),
+              HasSubstr("chunk list is corrupt"));
   EXPECT_THAT(assemble({{"dance", relight.argument, relight_0.outputs}}, kInvalidArgument), HasSubstr("unknown kind"));
 }
 
