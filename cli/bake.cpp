@@ -302,8 +302,8 @@ Command bake_command() {
   options.push_back(std::move(server));
   options.push_back(o->farm.timeout_option());
   options.push_back({"--json", "print the report as JSON", &o->farm.json});
-  return {"bake", "Bake a level into a .loom asset; if that is there, by its parameters, and only what has changed", std::move(options), [o] { return check(o.get()); },
-          [o] { return run(*o); }};
+  return {"bake", "Bake a level into a .loom asset; if that is there, by its parameters, and only what has changed",
+          std::move(options), [o] { return check(o.get()); }, [o] { return run(*o); }};
 }
 
 }  // namespace lightloom

@@ -196,8 +196,8 @@ absl::StatusOr<RemoteJob> FarmClient::submit(std::span<const uint8_t> scene, con
 }
 
 absl::StatusOr<RemoteJob> FarmClient::submit(const std::string& request_id, std::span<const uint8_t> payload,
-                                             const SpawnedTask& first, const std::vector<Digest>& inputs, const std::string& name,
-                                             int32_t priority) {
+                                             const SpawnedTask& first, const std::vector<Digest>& inputs,
+                                             const std::string& name, int32_t priority) {
   v1::SubmitRequest request;
   request.set_request_id(request_id);
   const char* user = std::getenv("USER");

@@ -42,8 +42,8 @@ absl::StatusOr<RemoteJob> submit_level(FarmClient* farm, const std::string& scen
   LL_RETURN_IF_ERROR(load_level(scene).status());
   LL_ASSIGN_OR_RETURN(const std::vector<uint8_t> bytes, read_file(scene));
   ProgressBar bar;
-  return farm->submit(bytes, params, earlier, name.empty() ? std::filesystem::path(scene).stem().string() : name, priority,
-                      [&](uint64_t there) { bar.update("upload", there, bytes.size()); });
+  return farm->submit(bytes, params, earlier, name.empty() ? std::filesystem::path(scene).stem().string() : name,
+                      priority, [&](uint64_t there) { bar.update("upload", there, bytes.size()); });
 }
 
 absl::StatusOr<Manifest> fetch_asset(FarmClient* farm, uint64_t job, const std::string& loom) {

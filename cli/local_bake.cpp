@@ -77,9 +77,9 @@ absl::StatusOr<BakeReport> local_bake(const RayTracer& tracer, const LocalBake& 
   const bool looks_back = bake.earlier != nullptr && !bake.earlier->traces.empty();
   if (looks_back) {
     results = {sha256(bake.earlier->traces), bake.earlier->tolerance};
-    LL_ASSIGN_OR_RETURN(reuse, session->reuse(
-                                   results, [&] { return decode_bake_traces(bake.earlier->traces); },
-                                   control.stage("reuse")));
+    LL_ASSIGN_OR_RETURN(reuse,
+                        session->reuse(
+                            results, [&] { return decode_bake_traces(bake.earlier->traces); }, control.stage("reuse")));
   }
   const double seconds_plan = watch.seconds();
   if (bake.planned && !bake.planned(*session, *reuse)) return BakeReport();

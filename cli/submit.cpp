@@ -1,8 +1,8 @@
 // lightloom submit: a level's bake becomes a job of a farm.
 #include <cstdio>
 #include <memory>
-#include <optional>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "cli/bake_options.h"
 #include "cli/farm_command.h"
@@ -34,9 +34,9 @@ absl::Status run(const Options& o) {
   if (!o.from.empty()) {
     earlier = find_earlier_bake(o.from);
     if (!earlier || !earlier->why_not.empty()) {
-      return absl::FailedPreconditionError(o.from + " cannot be baked from: " +
-                                           (earlier ? earlier->why_not : "its manifest cannot be read") +
-                                           "; leave out --from");
+      return absl::FailedPreconditionError(
+          o.from + " cannot be baked from: " + (earlier ? earlier->why_not : "its manifest cannot be read") +
+          "; leave out --from");
     }
   }
   FarmClient farm = o.farm->connect();
@@ -55,11 +55,11 @@ absl::Status run(const Options& o) {
 
 Command submit_command() {
   const auto o = std::make_shared<Options>();
-  std::vector<Option> options = {{"SCENE", "level, .glb", &o->scene, true},
-                                 {"--from", "an earlier bake's .loom: by its parameters, and only what has changed",
-                                  &o->from},
-                                 {"--name", "for people; empty: the level's", &o->name},
-                                 {"--priority", "higher ones first", &o->priority}};
+  std::vector<Option> options = {
+      {"SCENE", "level, .glb", &o->scene, true},
+      {"--from", "an earlier bake's .loom: by its parameters, and only what has changed", &o->from},
+      {"--name", "for people; empty: the level's", &o->name},
+      {"--priority", "higher ones first", &o->priority}};
   for (Option& option : o->how.options()) options.push_back(std::move(option));
   return farm_command(
       "submit", "Bake a level on a farm: print the job's number", o->farm, std::move(options), [o] { return run(*o); },

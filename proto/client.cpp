@@ -157,9 +157,8 @@ absl::StatusOr<std::vector<Digest>> BlobClient::find_missing(std::span<const Dig
     v1::FindMissingRequest request;
     for (const Digest& digest : digests.first(std::min(kMost, digests.size()))) request.add_digests(to_bytes(digest));
     v1::FindMissingResponse response;
-    LL_RETURN_IF_ERROR(call_with_retries(patience_, [&](grpc::ClientContext* context) {
-      return stub->FindMissing(context, request, &response);
-    }));
+    LL_RETURN_IF_ERROR(call_with_retries(
+        patience_, [&](grpc::ClientContext* context) { return stub->FindMissing(context, request, &response); }));
     for (const std::string& bytes : response.digests()) {
       LL_ASSIGN_OR_RETURN(const Digest digest, to_digest(bytes));
       missing.push_back(digest);

@@ -42,7 +42,8 @@ absl::StatusOr<std::vector<uint32_t>> used_probes(const Plan& plan, const std::v
   const auto& probes = plan.placement.probes;
   auto probe = probes.begin();
   for (const ProbeName& name : names) {
-    probe = std::lower_bound(probe, probes.end(), name, [](const Probe& p, const ProbeName& n) { return p.name() < n; });
+    probe =
+        std::lower_bound(probe, probes.end(), name, [](const Probe& p, const ProbeName& n) { return p.name() < n; });
     if (probe == probes.end() || probe->name() != name) return bad("a cell reads a probe that is not planned");
     used.push_back(static_cast<uint32_t>(probe - probes.begin()));
   }

@@ -94,7 +94,8 @@ absl::StatusOr<BakeReport> bake(const RayTracer& tracer, const BakeParams& param
   std::vector<RelightRecord> relight(plan.placement.probes.size());
   Reuse reuse = no_reuse(plan);
   if (earlier != nullptr) {
-    LL_ASSIGN_OR_RETURN(reuse, find_reuse(plan, session->scene(), session->world(), *earlier, tolerance, control.stage("reuse")));
+    LL_ASSIGN_OR_RETURN(
+        reuse, find_reuse(plan, session->scene(), session->world(), *earlier, tolerance, control.stage("reuse")));
     for (size_t i = 0; i < cells.size(); ++i) {
       if (reuse.cells[i].why != ReuseItem::kHolds) continue;
       cells[i] = earlier->cells[reuse.cells[i].earlier];

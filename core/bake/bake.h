@@ -22,8 +22,8 @@ struct BakeReport {
   double seconds_transport = 0, seconds_compress = 0, seconds_relight = 0;
   double seconds_write = 0;
   uint64_t clusters_reused = 0, cells_reused = 0, probes_reused = 0;  ///< taken over from an earlier bake
-  uint64_t cells_stale = 0;  ///< of them: kept although they may have changed
-  double stale = 0;          ///< the largest share of one that may
+  uint64_t cells_stale = 0;                                           ///< of them: kept although they may have changed
+  double stale = 0;                                                   ///< the largest share of one that may
   uint64_t bytes_total = 0, bytes_projection = 0, bytes_reconstruction = 0, bytes_relight = 0;
 };
 
@@ -39,7 +39,6 @@ void add_times(const BakeSession& session, int threads, BakeReport* report);
 /// Bakes into the folder `loom`. The old manifest, if any, stays in force until the new one replaces it whole. What holds
 /// of `earlier`, whose chunks are there, is taken over: without a tolerance (see find_reuse) the bytes are as without it.
 absl::StatusOr<BakeReport> bake(const RayTracer& tracer, const BakeParams& params, const std::filesystem::path& loom,
-                                const BakeControl& control, const BakeTraces* earlier = nullptr,
-                                double tolerance = 0);
+                                const BakeControl& control, const BakeTraces* earlier = nullptr, double tolerance = 0);
 
 }  // namespace lightloom

@@ -24,7 +24,8 @@ struct Header {
 static_assert(sizeof(Header) == 52 && sizeof(CellContents) == 32);
 
 absl::Status corrupt(std::string_view why) {
-  return absl::DataLossError("the traces of the bake are corrupt: " + std::string(why) + "; fetch the asset again, or bake it anew");
+  return absl::DataLossError("the traces of the bake are corrupt: " + std::string(why) +
+                             "; fetch the asset again, or bake it anew");
 }
 
 }  // namespace

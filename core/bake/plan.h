@@ -42,7 +42,7 @@ struct Plan {
   Receivers receivers;
   PlacementResult placement;
   std::vector<PlannedCell> cells;
-  WorldGrid grid;  ///< by which traces are kept
+  WorldGrid grid;                                    ///< by which traces are kept
   double seconds_receivers = 0, seconds_probes = 0;  ///< that finding them took
 };
 

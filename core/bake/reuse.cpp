@@ -68,8 +68,7 @@ std::vector<uint32_t> dirty_first(std::span<const ReuseItem> items) {
   for (uint32_t i = 0; i < items.size(); ++i) {
     if (items[i].why != ReuseItem::kHolds) dirty.push_back(i);
   }
-  std::stable_sort(dirty.begin(), dirty.end(),
-                   [&](uint32_t a, uint32_t b) { return items[a].share > items[b].share; });
+  std::stable_sort(dirty.begin(), dirty.end(), [&](uint32_t a, uint32_t b) { return items[a].share > items[b].share; });
   return dirty;
 }
 

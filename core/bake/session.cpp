@@ -168,9 +168,9 @@ const WorldContents& BakeSession::world() const {
   return world_;
 }
 
-absl::StatusOr<std::shared_ptr<const Reuse>> BakeSession::reuse(
-    const EarlierResults& earlier, const std::function<absl::StatusOr<BakeTraces>()>& load,
-    const Parallel& parallel) const {
+absl::StatusOr<std::shared_ptr<const Reuse>> BakeSession::reuse(const EarlierResults& earlier,
+                                                                const std::function<absl::StatusOr<BakeTraces>()>& load,
+                                                                const Parallel& parallel) const {
   {
     const std::lock_guard lock(mutex_);
     if (reuse_.second != nullptr && reuse_.first == earlier) return reuse_.second;

@@ -95,7 +95,7 @@ class BakeSession {
   mutable std::once_flag world_known_;
   mutable WorldContents world_;  // once it is known
   mutable std::mutex mutex_;
-  mutable Spent spent_;  // guarded by mutex_
+  mutable Spent spent_;                                                    // guarded by mutex_
   mutable std::pair<EarlierResults, std::shared_ptr<const Reuse>> reuse_;  // guarded by mutex_
 };
 

@@ -54,7 +54,8 @@ struct ReusedHeader {
   uint32_t cells, probes;
 };
 static_assert(sizeof(BakeParams) == 56 && sizeof(PayloadRecord) == 104 && sizeof(ArgumentRecord) == 48 &&
-              sizeof(SummaryRecord) == 64 && sizeof(RefsHeader) == 16 && sizeof(EarlierRecord) == 48 && sizeof(ReusedHeader) == 48 && sizeof(ChunkRef) == 40);
+              sizeof(SummaryRecord) == 64 && sizeof(RefsHeader) == 16 && sizeof(EarlierRecord) == 48 &&
+              sizeof(ReusedHeader) == 48 && sizeof(ChunkRef) == 40);
 
 absl::Status corrupt(std::string_view what, std::string_view why) {
   return absl::InvalidArgumentError(std::string(what) + " is corrupt: " + std::string(why) +

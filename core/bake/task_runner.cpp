@@ -256,7 +256,8 @@ class Assembly {
     if (reused.size() != all->size()) return bad("what 'plan' found to hold does not fit the plan");
     for (size_t i = 0; i < reused.size(); ++i) {
       if (reused[i].earlier == ReusedResults::Item::kNone) continue;
-      if (reused[i].earlier >= earlier.size()) return bad("'plan' names a " + kind + " that the earlier bake does not have");
+      if (reused[i].earlier >= earlier.size())
+        return bad("'plan' names a " + kind + " that the earlier bake does not have");
       if ((*have)[i]) return bad("it has " + kind + " " + std::to_string(i) + " twice");
       (*have)[i] = true;
       (*all)[i] = std::move(earlier[reused[i].earlier]);

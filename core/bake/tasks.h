@@ -38,7 +38,7 @@ struct CellResult {
   GatherStats stats;
   double error = 0;
   Aabb bounds;
-  Trace trace;  ///< it reads geometry
+  Trace trace;                                         ///< it reads geometry
   double transport_seconds = 0, compress_seconds = 0;  ///< thread time; not part of the result's bytes
 };
 

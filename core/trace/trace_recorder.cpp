@@ -11,7 +11,7 @@
 namespace lightloom {
 namespace {
 
-constexpr uint32_t kSkySide = 16;   // cells along the octahedral map of directions
+constexpr uint32_t kSkySide = 16;      // cells along the octahedral map of directions
 constexpr uint64_t kSky = 1ull << 31;  // above every index of a grid
 constexpr uint32_t kOriginShift = 32;
 // Of a cell: more than positions are rounded by, and less than anybody would miss.

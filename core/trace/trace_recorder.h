@@ -29,9 +29,7 @@ class TraceRecorder {
   /// It left the level, towards `direction`.
   Place sky(Vec3 direction);
   /// The probe was asked whether it sees what the last ray to `place` found.
-  void ask(Place place, uint32_t probe) {
-    asked_[size_t{place} * words_ + probe / 64] |= uint64_t{1} << (probe % 64);
-  }
+  void ask(Place place, uint32_t probe) { asked_[size_t{place} * words_ + probe / 64] |= uint64_t{1} << (probe % 64); }
 
   /// What was written down. `probes`: positions of those that were asked.
   Trace finish(std::span<const Vec3> probes);
@@ -54,8 +52,8 @@ class TraceRecorder {
   void draw(const Sweep& sweep, uint32_t rays);
 
   WorldGrid grid_;
-  size_t words_;  // of asked_, per place
-  Vec3 corner_;   // of the grid
+  size_t words_;                     // of asked_, per place
+  Vec3 corner_;                      // of the grid
   float side_, per_metre_, margin_;  // of a cell, metres
   std::vector<Aabb> origins_;
   absl::flat_hash_map<uint64_t, uint32_t> origin_of_;  // by the world cell of the box's middle

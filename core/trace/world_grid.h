@@ -11,8 +11,8 @@ namespace lightloom {
 
 /// Cells of side 2^level metres, anchored to the origin, and the box of them that holds a level.
 struct WorldGrid {
-  static constexpr uint32_t kMostAlong = 1u << 11;   ///< cells along an axis
-  static constexpr uint64_t kMostCells = 1ull << 20;  ///< of the box
+  static constexpr uint32_t kMostAlong = 1u << 11;    ///< cells along an axis
+  static constexpr uint64_t kMostCells = 1ull << 18;  ///< of the box
 
   int32_t level = 0;
   GridCell lo{};                   ///< the box's first cell

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <thread>
 
+#include "cli/earlier_bake.h"
 #include "tests/cluster/farm_fixture.h"
 
 namespace lightloom {
@@ -57,6 +58,42 @@ TEST_F(FarmTest, WhatAnEarlierJobBakedIsNotBakedAgain) {
   EXPECT_EQ(third.state, "done") << "at once, and without a worker";
   EXPECT_EQ(third.reused, third.tasks);
   expect_fetched_as_baked(third.id);
+}
+
+TEST_F(FarmTest, AnEditIsBakedFromAnEarlierAsset) {
+  const fs::path loom = folder_.path() / "earlier.loom";
+  const auto bake_locally = [&](const fs::path& level, const fs::path& to) {
+    const Scene scene = value_or_die(load_gltf(level));
+    const auto tracer = value_or_die(RayTracer::create(scene));
+    (void)value_or_die(bake(*tracer, params_, to, {}));
+  };
+  bake_locally(scene_path_, loom);
+  const auto earlier = find_earlier_bake(loom);
+  ASSERT_TRUE(earlier.has_value());
+  ASSERT_EQ(earlier->why_not, "");
+  params_ = earlier->manifest.params;
+
+  Scene scene = value_or_die(load_gltf(scene_path_));
+  Object& moved = scene.objects.back();
+  moved.transform[12] += 0.03;
+  for (Vec3& p : moved.positions) p.x += 0.03f;
+  ASSERT_TRUE(save_gltf(scene, scene_path_).ok());
+  scene_ = value_or_die(read_file(scene_path_));
+
+  // The farm has never seen the earlier asset, and its workers are not asked for what holds of it.
+  const RunningWorker worker(dial(address()), "worker");
+  FarmClient client(address());
+  const RemoteJob whole = watch(submit().id);
+  const RemoteJob job = watch(value_or_die(client.submit(scene_, params_, &*earlier, "edit", 0, [](uint64_t) {})).id);
+  ASSERT_EQ(job.state, "done") << job.error;
+  EXPECT_LT(job.tasks, whole.tasks);
+  const CancelFlag never;
+  for (const uint64_t id : {whole.id, job.id}) {
+    value_or_die(client.fetch(id, folder_.path() / std::to_string(id), never, [](uint64_t, uint64_t) {}));
+  }
+  EXPECT_EQ(value_or_die(read_file(folder_.path() / std::to_string(job.id) / "manifest")),
+            value_or_die(read_file(folder_.path() / std::to_string(whole.id) / "manifest")));
+  EXPECT_EQ(verify_asset(folder_.path() / std::to_string(job.id)), absl::OkStatus());
 }
 
 TEST_F(FarmTest, WorkersLeaveAndJoinOnTheWay) {

@@ -9,6 +9,7 @@
 #include "core/scene/image.h"
 #include "tests/support/test_scenes.h"
 #include "tests/unit/core/asset/samples.h"
+#include "tests/unit/core/bake/sample_traces.h"
 
 namespace lightloom {
 namespace {
@@ -50,7 +51,7 @@ void put_loom(const fs::path& path, uint8_t kind, std::vector<uint8_t> bytes) {
 }
 
 int make_seeds(const fs::path& folder) {
-  for (const char* kind : {"gltf", "exr", "rig", "loom"}) fs::create_directories(folder / kind);
+  for (const char* kind : {"gltf", "exr", "rig", "loom", "traces"}) fs::create_directories(folder / kind);
   must(write_file_atomic(folder / "gltf" / "all.gltf", std::string_view(kGltf)));
   must(save_gltf(test::facing_plates(1, 2), folder / "gltf" / "plates.glb"));
   must(save_gltf(test::room_with_crate(), folder / "gltf" / "crate.glb"));
@@ -63,6 +64,7 @@ int make_seeds(const fs::path& folder) {
   put_loom(folder / "loom" / "cell", 1, encode_cell(testing::sample_cell()));
   put_loom(folder / "loom" / "relight", 2, encode_relight(testing::sample_relight()));
   put_loom(folder / "loom" / "surface", 3, encode_surface(testing::sample_surface()));
+  must(write_file_atomic(folder / "traces" / "small", encode_bake_traces(test::sample_traces())));
   return 0;
 }
 

@@ -36,7 +36,6 @@ void turn(Object* object, Vec3 at, float angle) {
   for (Vec3& n : object->normals) n = turned(n);
 }
 
-
 /// A material of the object's own, to be changed.
 Material& own_material(Scene* scene, Object* object) {
   Material copy = scene->materials[object->triangles.front().material];

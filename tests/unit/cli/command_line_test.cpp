@@ -36,6 +36,7 @@ TEST_F(CommandLine, UsageErrorsNameWhatIsWrong) {
   fails(2, {"reference", scene_, "-o", "x.exr", "--lightmap-size", "8193"}, "0 to 8192");
   fails(2, {"bake", scene_, "-o", "x.loom", "--threads", "2000"}, "--threads");
   fails(2, {"bake", scene_, "-o", "x.loom", "--threads", "-1"}, "--threads");
+  fails(2, {"bake", scene_, "-o", "x.loom", "--tolerance", "1"}, "--tolerance must be at least 0");
   fails(2, {"bake", scene_, "-o", "x.loom", "--bad\nname"}, "--bad\\nname");
 }
 
@@ -264,6 +265,65 @@ TEST_F(CommandLine, ABakeThatWasStoppedGoesOn) {
   ASSERT_EQ(run(bake_to(path("whole.loom"))).code, 0);
   EXPECT_EQ(text_of(fs::path(loom) / "manifest"), text_of(path("whole.loom/manifest")));
   EXPECT_EQ(run({"verify", loom}).code, 0);
+}
+
+TEST_F(CommandLine, ARebakeTakesOverWhatStillHolds) {
+  const std::vector<std::string> how = {"--texels-per-metre", "3",  "--rays",     "32", "--relight-rays", "64",
+                                        "--cell-receivers",   "64", "--max-rank", "4"};
+  const auto bake = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), "bake");
+    const Result r = run(arguments);
+    EXPECT_EQ(r.code, 0) << r.err;
+    return r;
+  };
+  const auto with_how = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.end(), how.begin(), how.end());
+    return arguments;
+  };
+  const std::string loom = path("edited.loom"), whole = path("whole.loom"), edited = path("edited.glb");
+  bake(with_how({scene_, "-o", loom}));
+  const auto manifest = [](const std::string& folder) { return text_of(fs::path(folder) / "manifest"); };
+  const std::string before = manifest(loom);
+
+  // Without parameters: those of the asset, which is up to date. Names are no geometry, but in the manifest.
+  EXPECT_THAT(bake({scene_, "-o", loom}).out, HasSubstr("are the earlier bake's"));
+  EXPECT_EQ(manifest(loom), before);
+  Scene scene = *builtin_scene("cornell");
+  scene.objects[0].name = "another name";
+  ASSERT_TRUE(save_gltf(scene, edited).ok());
+  bake({edited, "-o", loom});
+  EXPECT_NE(manifest(loom), before);
+
+  Object& moved = scene.objects.back();
+  moved.transform[12] += 0.03;
+  for (Vec3& p : moved.positions) p.x += 0.03f;
+  ASSERT_TRUE(save_gltf(scene, edited).ok());
+  fails(1, {"verify", loom, "--scene", edited}, "stale");
+  const std::string still = manifest(loom);
+  EXPECT_THAT(bake({edited, "-o", loom, "--dry-run", "--explain"}).out, HasSubstr("of its rays pass where"));
+  EXPECT_THAT(bake({edited, "-o", loom, "--dry-run", "--json"}).out, HasSubstr("\"cells_dirty\":"));
+  EXPECT_EQ(manifest(loom), still) << "a dry run writes nothing";
+
+  // First what matters, on record; then the rest.
+  EXPECT_THAT(bake({edited, "-o", loom, "--tolerance", "0.9"}).out, HasSubstr("are stale"));
+  fails(1, {"verify", loom, "--scene", edited}, "with a tolerance");
+  bake({edited, "-o", loom});
+  EXPECT_EQ(run({"verify", loom, "--scene", edited}).code, 0);
+  bake(with_how({edited, "-o", whole}));
+  EXPECT_EQ(manifest(loom), manifest(whole));
+
+  // An asset that has lost something is baked anew, and whole.
+  const auto chunk = [&] {
+    for (const auto& file : fs::recursive_directory_iterator(fs::path(whole) / "chunks")) {
+      if (file.is_regular_file()) return file.path();
+    }
+    return fs::path();
+  }();
+  fs::remove(chunk);
+  EXPECT_THAT(bake({edited, "-o", whole}).err, HasSubstr("baked anew: some of its chunks are missing"));
+  EXPECT_TRUE(fs::exists(chunk));
+  EXPECT_EQ(manifest(loom), manifest(whole));
+  EXPECT_THAT(bake({edited, "-o", whole, "--fresh", "--rays", "4", "--json"}).out, HasSubstr("\"cells_reused\":0"));
 }
 
 TEST_F(CommandLine, WhatIsWrongWithALevelIsOneWarning) {

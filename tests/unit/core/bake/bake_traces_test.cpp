@@ -5,30 +5,17 @@
 #include <gtest/gtest.h>
 
 #include "tests/unit/core/bake/hostile_bytes.h"
+#include "tests/unit/core/bake/sample_traces.h"
 
 namespace lightloom {
 namespace {
 
 using test::with;
 
-BakeTraces traces_of_a_bake() {
-  const WorldGrid grid{0, {-1, 0, 2}, {2, 1, 3}};
-  BakeTraces t;
-  t.world = {grid, {1, 4}, {{{{1, 2}}, {{0, 0}}}, {{{3, 4}}, {{5, 6}}}}};
-  CellRecord cell;
-  cell.chunk = {sha256("chunk"), 4000};
-  cell.bounds = {{-1, 0, 2}, {1, 2, 3}};
-  cell.key = sha256("cell");
-  cell.trace = {grid, 3, {0x5f}};
-  cell.clusters = {{{{-1, 0, 2}, {0, 1, 3}}, 30, 0, 0, 0}};
-  t.cells = {cell, cell};
-  t.probes = {{{{1, 2, 3}, 4}, sha256("probe"), {sha256("relight"), 77}, {grid, 0, {0x0c, 0x40}}}};
-  return t;
-}
 constexpr size_t kGrid = 8, kContents = 36, kCellRecords = 40, kRelightBytes = 44, kCells = 64;
 
 TEST(BakeTraces, RoundTrip) {
-  const BakeTraces in = traces_of_a_bake();
+  const BakeTraces in = test::sample_traces();
   const auto out = decode_bake_traces(encode_bake_traces(in));
   ASSERT_TRUE(out.ok()) << out.status();
   EXPECT_EQ(out->world.grid, in.world.grid);
@@ -46,7 +33,7 @@ TEST(BakeTraces, RoundTrip) {
 }
 
 TEST(BakeTraces, RefuseOtherLengthsAndCounts) {
-  const auto bytes = encode_bake_traces(traces_of_a_bake());
+  const auto bytes = encode_bake_traces(test::sample_traces());
   test::expect_exact_length(bytes, decode_bake_traces);
   for (const size_t at : {size_t{0}, size_t{4}, kContents, kCellRecords, kRelightBytes}) {
     test::expect_count_checked(bytes, at, decode_bake_traces);
@@ -54,7 +41,7 @@ TEST(BakeTraces, RefuseOtherLengthsAndCounts) {
 }
 
 TEST(BakeTraces, RefuseAWorldThatIsNone) {
-  const auto bytes = encode_bake_traces(traces_of_a_bake());
+  const auto bytes = encode_bake_traces(test::sample_traces());
   const auto refused = [&](size_t at, auto value) {
     return decode_bake_traces(with(bytes, at, value)).status().code() == absl::StatusCode::kDataLoss;
   };
@@ -66,7 +53,7 @@ TEST(BakeTraces, RefuseAWorldThatIsNone) {
 }
 
 TEST(BakeTraces, AnyFlippedByteIsReadOrRefused) {
-  const auto bytes = encode_bake_traces(traces_of_a_bake());
+  const auto bytes = encode_bake_traces(test::sample_traces());
   for (size_t i = 0; i < bytes.size(); ++i) {
     const auto result = decode_bake_traces(with(bytes, i, static_cast<uint8_t>(~bytes[i])));
     EXPECT_TRUE(result.ok() || absl::IsDataLoss(result.status())) << i;

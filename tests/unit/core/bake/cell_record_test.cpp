@@ -32,9 +32,9 @@ CellRecord record() {
   return r;
 }
 // Offsets of the header's fields.
-constexpr size_t kProbes = 8, kClusters = 12, kChunkSize = 80, kLo = 88, kUnseen = 120, kError = 128, kCoefficients = 136,
-                 kBytesProjection = 144, kStale = 160, kProbeNames = 176, kClusterList = 224, kTrace = 304, kSky = kTrace + 28,
-                 kRunCount = kTrace + 32, kRuns = 352;
+constexpr size_t kProbes = 8, kClusters = 12, kChunkSize = 80, kLo = 88, kUnseen = 120, kError = 128,
+                 kCoefficients = 136, kBytesProjection = 144, kStale = 160, kProbeNames = 176, kClusterList = 224,
+                 kTrace = 304, kSky = kTrace + 28, kRunCount = kTrace + 32, kRuns = 352;
 
 TEST(CellRecord, RoundTrip) {
   const CellRecord in = record();

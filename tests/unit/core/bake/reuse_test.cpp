@@ -70,8 +70,7 @@ class Edited {
     const test::Edit edit = test::random_edit(&scene_, rng);
     SCOPED_TRACE(edit.what);
     const Manifest old = test::value_or_die(read_manifest(loom()));
-    const BakeTraces earlier =
-        test::value_or_die(decode_bake_traces(test::value_or_die(read_traces(loom(), old))));
+    const BakeTraces earlier = test::value_or_die(decode_bake_traces(test::value_or_die(read_traces(loom(), old))));
     const auto report = rebake(&earlier);
     if (!report.ok()) {  // nothing is left to bake: as a whole bake would say
       scene_ = std::move(before);

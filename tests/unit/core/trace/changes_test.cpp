@@ -44,10 +44,12 @@ TEST(Changes, RaysAreReachedByWhatTheyPassOnly) {
   const SmallWorld before(with_crate_at(0)), after(with_crate_at(0.3f));
   const Changes changes(before.contents, after.contents);
   EXPECT_GT(changes.cells(), 10u);
-  const auto share = [&](Vec3 from, Vec3 to) { return changes.share(ray(before.contents.grid, from, to), Reads::kGeometry); };
-  EXPECT_EQ(share({0.2f, 0.5f, 1.7f}, {3.9f, 0.5f, 1.7f}), 1);    // through it
-  EXPECT_EQ(share({0.2f, 2.5f, 0.2f}, {3.9f, 2.5f, 3.9f}), 0);    // high above it
-  EXPECT_EQ(share({0.2f, 0.5f, 3.9f}, {3.9f, 0.5f, 3.9f}), 0);    // past it
+  const auto share = [&](Vec3 from, Vec3 to) {
+    return changes.share(ray(before.contents.grid, from, to), Reads::kGeometry);
+  };
+  EXPECT_EQ(share({0.2f, 0.5f, 1.7f}, {3.9f, 0.5f, 1.7f}), 1);  // through it
+  EXPECT_EQ(share({0.2f, 2.5f, 0.2f}, {3.9f, 2.5f, 3.9f}), 0);  // high above it
+  EXPECT_EQ(share({0.2f, 0.5f, 3.9f}, {3.9f, 0.5f, 3.9f}), 0);  // past it
 }
 
 TEST(Changes, ReceiversAreReadBySomeOnly) {
