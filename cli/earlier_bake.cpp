@@ -30,8 +30,8 @@ absl::Status read_results(EarlierBake* bake) {
     return absl::FailedPreconditionError("it was baked by another version of the method");
   }
   auto traces = read_traces(bake->loom, bake->manifest);
-  if (!traces.ok()) return absl::NotFoundError("it has no traces");
-  const auto decoded = decode_bake_traces(*traces);
+  if (absl::IsNotFound(traces.status())) return absl::NotFoundError("it has no traces");
+  const absl::StatusOr<BakeTraces> decoded = traces.ok() ? decode_bake_traces(*traces) : traces.status();
   if (!decoded.ok()) return absl::DataLossError("its traces are damaged");
   if (!has_all_chunks(*bake)) return absl::DataLossError("some of its chunks are missing");
   bake->stale = stale_share(*decoded);

@@ -94,14 +94,27 @@ absl::Status write_manifest(const std::filesystem::path& loom, const Manifest& m
                             std::span<const uint8_t> traces) {
   const std::vector<uint8_t> bytes = encode_manifest(manifest);
   const std::filesystem::path its_traces = traces_path(loom, bytes);
-  if (!traces.empty()) LL_RETURN_IF_ERROR(write_file_atomic(its_traces, traces));
+  if (!traces.empty()) {
+    std::vector<uint8_t> sealed(traces.begin(), traces.end());
+    const Digest seal = sha256(traces);
+    sealed.insert(sealed.end(), seal.bytes.begin(), seal.bytes.end());
+    LL_RETURN_IF_ERROR(write_file_atomic(its_traces, sealed));
+  }
   LL_RETURN_IF_ERROR(write_file_atomic(loom / "manifest", bytes));
   remove_traces_but(its_traces);
   return absl::OkStatus();
 }
 
 absl::StatusOr<std::vector<uint8_t>> read_traces(const std::filesystem::path& loom, const Manifest& manifest) {
-  return read_file(traces_path(loom, encode_manifest(manifest)));
+  const std::filesystem::path path = traces_path(loom, encode_manifest(manifest));
+  LL_ASSIGN_OR_RETURN(auto bytes, read_file(path));
+  Digest seal;
+  if (bytes.size() >= seal.bytes.size()) {
+    std::copy(bytes.end() - static_cast<ptrdiff_t>(seal.bytes.size()), bytes.end(), seal.bytes.begin());
+    bytes.resize(bytes.size() - seal.bytes.size());
+    if (sha256(bytes) == seal) return bytes;
+  }
+  return absl::DataLossError(path.string() + " is damaged; remove it, and the next bake is a whole one");
 }
 
 absl::StatusOr<Manifest> read_manifest(const std::filesystem::path& loom) {
@@ -145,6 +158,9 @@ absl::Status verify_asset(const std::filesystem::path& loom) {
     if (!chunk.ok()) return in_context(chunk.status(), what);
     LL_RETURN_IF_ERROR(verify_cell(m, m.cells[i], *chunk, what));
     for (const ChunkObject& o : chunk->objects) LL_RETURN_IF_ERROR(check_object(objects, o, what));
+  }
+  if (const auto traces = read_traces(loom, m); !traces.ok() && !absl::IsNotFound(traces.status())) {
+    return traces.status();
   }
   return absl::OkStatus();
 }

@@ -33,7 +33,7 @@ ChunkStore chunk_store(const std::filesystem::path& loom);
 absl::Status write_manifest(const std::filesystem::path& loom, const Manifest& manifest,
                             std::span<const uint8_t> traces = {});
 absl::StatusOr<Manifest> read_manifest(const std::filesystem::path& loom);
-/// NotFound: the bake left none.
+/// NotFound: the bake left none. DataLoss: they are not what was written.
 absl::StatusOr<std::vector<uint8_t>> read_traces(const std::filesystem::path& loom, const Manifest& manifest);
 
 /// Reads every chunk and checks that manifest and chunks agree: digests, counts, sizes, orders, object identities.

@@ -18,7 +18,7 @@ struct WorldGrid {
   GridCell lo{};                   ///< the box's first cell
   std::array<uint32_t, 3> size{};  ///< cells of the box along each axis
 
-  /// Cells of about a quarter of a probe cell, or larger where the box would hold too many; at least one around `bounds`.
+  /// Cells of about half a probe cell, or larger where the box would hold too many; at least one around `bounds`.
   /// REQUIRES: bounds not empty, spacing > 0.
   static WorldGrid around(const Aabb& bounds, float spacing);
 

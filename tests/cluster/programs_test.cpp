@@ -222,7 +222,8 @@ TEST_F(Programs, BakeOnAFarmIsOneCommand) {
   EXPECT_GT(number(r.out, "receivers"), 0);
   EXPECT_EQ(number(r.out, "transport"), -1) << "that is the workers' time";
   expect_as_baked_here(path("farm.loom"));
-  const Result text = run(join({"bake", scene_, "-o", path("farm.loom"), "--server", server->address()}, how()));
+  const Result text =
+      run(join({"bake", scene_, "-o", path("farm.loom"), "--fresh", "--server", server->address()}, how()));
   EXPECT_THAT(text.out, HasSubstr("as job 2: "));
   expect_as_baked_here(path("farm.loom"));
 

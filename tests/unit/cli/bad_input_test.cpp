@@ -153,10 +153,12 @@ TEST_F(BadInput, AFlippedByteInAnyFileOfAnAsset) {
       test::write(file, flipped);
       fails(1, {"verify", loom}, file.filename().string());
     }
-    EXPECT_THAT(
-        fails(1, {"render", loom, scene_, "--lightmap", path("e.exr"), "--device", "simd"}, file.filename().string()),
-        HasSubstr("bake"));
-    EXPECT_FALSE(fs::exists(path("e.exr")));
+    if (!file.filename().string().starts_with("traces-")) {  // those no runtime reads
+      EXPECT_THAT(
+          fails(1, {"render", loom, scene_, "--lightmap", path("e.exr"), "--device", "simd"}, file.filename().string()),
+          HasSubstr("bake"));
+      EXPECT_FALSE(fs::exists(path("e.exr")));
+    }
     test::write(file, whole);
   }
   EXPECT_EQ(run({"verify", loom}).code, 0);

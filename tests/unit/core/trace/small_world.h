@@ -16,7 +16,7 @@ struct SmallWorld {
     const AtlasLayout layout = make_layout(scene, options).value();
     const auto tracer = RayTracer::create(scene).value();
     const Receivers receivers = find_receivers(*tracer, layout, {}).value();
-    contents = contents_of(scene, layout, receivers, WorldGrid::around(scene.bounds(), 2));
+    contents = contents_of(scene, layout, receivers, WorldGrid::around(scene.bounds(), 1));
   }
   Scene scene;
   WorldContents contents;

@@ -13,7 +13,7 @@ namespace {
 
 constexpr Aabb kLevel{{-4, 0, -3}, {6, 5, 7}};
 
-WorldGrid grid() { return WorldGrid::around(kLevel, 4); }
+WorldGrid grid() { return WorldGrid::around(kLevel, 2); }
 
 Vec3 somewhere(Rng* rng, const Aabb& box) {
   Vec3 p;

@@ -7,7 +7,7 @@ namespace {
 
 TEST(WorldGrid, HoldsTheBoundsAndACellAround) {
   const Aabb bounds{{-3.2f, 0, 1}, {5, 2.9f, 1}};
-  const WorldGrid grid = WorldGrid::around(bounds, 4);
+  const WorldGrid grid = WorldGrid::around(bounds, 2);
   EXPECT_EQ(grid.level, 0);
   EXPECT_EQ(grid.side(), 1.0);
   EXPECT_EQ(grid.lo, (GridCell{-5, -1, 0}));
