@@ -84,7 +84,14 @@ TEST_F(FarmTest, AnEditIsBakedFromAnEarlierAsset) {
   const RemoteJob whole = watch(submit().id);
   const RemoteJob job = watch(value_or_die(client.submit(scene_, params_, &*earlier, "edit", 0, [](uint64_t) {})).id);
   ASSERT_EQ(job.state, "done") << job.error;
-  EXPECT_LT(job.tasks, whole.tasks);
+  const auto cells = [&](uint64_t id) {
+    const std::vector<RemoteEvent> events = value_or_die(client.events(id));
+    return std::count_if(events.begin(), events.end(),
+                         [](const RemoteEvent& e) { return e.task.starts_with("cell ") && e.what == "completed"; });
+  };
+  EXPECT_GT(cells(whole.id), 10);
+  EXPECT_GT(cells(job.id), 0);
+  EXPECT_LT(cells(job.id), cells(whole.id));
   const CancelFlag never;
   for (const uint64_t id : {whole.id, job.id}) {
     value_or_die(client.fetch(id, folder_.path() / std::to_string(id), never, [](uint64_t, uint64_t) {}));
