@@ -3,10 +3,11 @@
 
 #include <nlohmann/json.hpp>
 
-#include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <optional>
+#include <system_error>
 
 #include "cli/bake_options.h"
 #include "cli/command.h"
@@ -17,6 +18,7 @@
 #include "cli/interrupt.h"
 #include "cli/level.h"
 #include "cli/local_bake.h"
+#include "cli/outlook.h"
 #include "cli/print_json.h"
 #include "cli/progress.h"
 #include "core/bake/bake.h"
@@ -58,6 +60,7 @@ nlohmann::json asset_json(const BakeReport& r) {
       {"rays_gather", r.rays_gather},
       {"rays_relight", r.rays_relight},
       {"unseen_fraction", r.rays_gather > 0 ? static_cast<double>(r.unseen) / static_cast<double>(r.rays_gather) : 0.0},
+      {"stale", {{"cells", r.cells_stale}, {"share", r.stale}}},
       {"seconds", {{"total", r.seconds_total}, {"write", r.seconds_write}}},
       {"bytes",
        {{"total", r.bytes_total},
@@ -71,7 +74,6 @@ nlohmann::json to_json(const BakeReport& r) {
   out.update({{"clusters_reused", r.clusters_reused},
               {"cells_reused", r.cells_reused},
               {"probes_reused", r.probes_reused},
-              {"stale", {{"cells", r.cells_stale}, {"share", r.stale}}},
               {"rays_visibility", r.rays_visibility},
               {"seconds",
                {{"plan", r.seconds_plan},
@@ -104,7 +106,13 @@ void print_asset(const std::string& output, const BakeReport& r) {
       static_cast<unsigned long long>(r.cells), r.coefficients);
 }
 
-void print_unseen(const BakeReport& r) {
+void print_quality(const BakeReport& r) {
+  if (r.stale > 0) {
+    std::printf(
+        "  %llu of the cells are stale, by an estimated %.2g %% of their light at most: bake without --tolerance to "
+        "finish\n",
+        static_cast<unsigned long long>(r.cells_stale), 100 * r.stale);
+  }
   std::printf("  unseen by any probe: %.4f %% of gather rays\n", percent(r.unseen, r.rays_gather));
 }
 
@@ -114,17 +122,13 @@ void print(const std::string& output, const BakeReport& r) {
     std::printf("  %llu of the cells and %llu of the relight sets are the earlier bake's\n",
                 static_cast<unsigned long long>(r.cells_reused), static_cast<unsigned long long>(r.probes_reused));
   }
-  if (r.stale > 0) {
-    std::printf("  %llu of the cells are stale, by up to %.2g %% of their light: bake without --tolerance to finish\n",
-                static_cast<unsigned long long>(r.cells_stale), 100 * r.stale);
-  }
   const double rays = static_cast<double>(r.rays_gather - r.rays_gather_reused + r.rays_visibility);
   std::printf("  %s: plan %s, transport %s (%srays, %srays/s), compression %s\n",
               human_seconds(r.seconds_total).c_str(), human_seconds(r.seconds_plan).c_str(),
               human_seconds(r.seconds_transport).c_str(), human_count(rays).c_str(),
               human_count(r.seconds_transport > 0 ? rays / r.seconds_transport : 0).c_str(),
               human_seconds(r.seconds_compress).c_str());
-  print_unseen(r);
+  print_quality(r);
 }
 
 void print(const std::string& output, const FarmBake& baked) {
@@ -133,7 +137,7 @@ void print(const std::string& output, const FarmBake& baked) {
               static_cast<unsigned long long>(baked.job.id), progress_line(baked.job).c_str(),
               human_count(static_cast<double>(baked.job.rays)).c_str(),
               human_seconds(baked.report.seconds_write).c_str());
-  print_unseen(baked.report);
+  print_quality(baked.report);
 }
 
 absl::Status check(Options* o) {
@@ -168,63 +172,6 @@ absl::Status run_on_farm(const Options& o, const BakeParams& params, const Earli
   return absl::OkStatus();
 }
 
-/// What is to be done: cells and relight sets whose earlier results do not hold.
-class Outlook {
- public:
-  Outlook(const BakeSession& session, const Reuse& reuse) : plan_(session.plan()), reuse_(reuse) {
-    for (const uint32_t i : dirty_first(reuse.cells)) {
-      receivers_ += plan_.cells[i].receivers.size();
-      ++cells_;
-    }
-    probes_ = dirty_first(reuse.probes).size();
-  }
-
-  nlohmann::json to_json(bool explain) const {
-    nlohmann::json out = {{"cells", plan_.cells.size()},
-                          {"cells_dirty", cells_},
-                          {"probes", plan_.placement.probes.size()},
-                          {"probes_dirty", probes_},
-                          {"receivers", plan_.receivers.all.size()},
-                          {"receivers_dirty", receivers_}};
-    if (!explain) return out;
-    out["dirty"] = nlohmann::json::array();
-    for (const uint32_t i : dirty_first(reuse_.cells)) {
-      const PlannedCell& cell = plan_.cells[i];
-      out["dirty"].push_back({{"level", cell.level},
-                              {"cell", cell.cell},
-                              {"receivers", cell.receivers.size()},
-                              {"why", why(reuse_.cells[i])},
-                              {"share", reuse_.cells[i].share}});
-    }
-    return out;
-  }
-
-  void print(bool explain) const {
-    std::printf("to bake: %zu of %zu cells (%.1f %% of the receivers), %zu of %zu relight sets\n", cells_,
-                plan_.cells.size(), percent(receivers_, plan_.receivers.all.size()), probes_,
-                plan_.placement.probes.size());
-    if (!explain) return;
-    for (const uint32_t i : dirty_first(reuse_.cells)) {
-      const PlannedCell& cell = plan_.cells[i];
-      const double side = std::ldexp(1.0, cell.level);
-      std::printf("  %g m cell at (%g, %g, %g), %zu receivers: %s\n", side, side * cell.cell[0], side * cell.cell[1],
-                  side * cell.cell[2], cell.receivers.size(), why(reuse_.cells[i]).c_str());
-    }
-  }
-
- private:
-  static std::string why(const ReuseItem& item) {
-    if (item.why == ReuseItem::kUnknown) return "its receivers, its probes or the parameters are others";
-    char text[100];
-    std::snprintf(text, sizeof text, "up to %.2g %% of its rays pass where something has changed", 100 * item.share);
-    return text;
-  }
-
-  const Plan& plan_;
-  const Reuse& reuse_;
-  size_t cells_ = 0, probes_ = 0, receivers_ = 0;
-};
-
 absl::Status print_report(const Options& o, const BakeReport& report) {
   if (o.farm.json) {
     print_json(to_json(report));
@@ -241,19 +188,23 @@ absl::Status run(const Options& o) {
   std::optional<EarlierBake> earlier;
   if (!o.fresh) earlier = find_earlier_bake(o.output);
   const BakeParams params = o.how.params(earlier ? &earlier->manifest.params : nullptr);
-  if (earlier) earlier->tolerance = static_cast<double>(o.tolerance);
-  if (earlier && !earlier->why_not.empty()) {
-    std::fprintf(stderr, "lightloom: %s is baked anew: %s\n", escape_controls(o.output).c_str(),
-                 earlier->why_not.c_str());
+  std::string anew;
+  if (earlier) {
+    earlier->tolerance = static_cast<double>(o.tolerance);
+    anew = earlier->why_not;
+  } else if (std::error_code unknown; !o.fresh && std::filesystem::exists(o.output + "/manifest", unknown)) {
+    anew = "its manifest cannot be read, nor the parameters there";
   }
-  if (earlier && !earlier->traces.empty() && earlier->stale <= earlier->tolerance && !o.dry_run &&
+  if (!anew.empty()) {
+    std::fprintf(stderr, "lightloom: %s is baked anew: %s\n", escape_controls(o.output).c_str(), anew.c_str());
+  }
+  if (earlier && !earlier->traces.empty() && report_of(earlier->manifest).stale <= earlier->tolerance && !o.dry_run &&
       is_up_to_date(earlier->manifest, *level.scene, params)) {
     BakeReport report = report_of(earlier->manifest);
     report.cells_reused = report.cells;
     report.clusters_reused = report.clusters;
     report.probes_reused = report.probes;
     report.rays_gather_reused = report.rays_gather;
-    report.stale = earlier->stale;
     report.seconds_total = watch.seconds();
     return print_report(o, report);
   }
@@ -270,7 +221,7 @@ absl::Status run(const Options& o) {
   bake.planned = [&](const BakeSession& session, const Reuse& reuse) {
     if (!o.explain && !o.dry_run) return true;
     bar.finish();
-    const Outlook outlook(session, reuse);
+    const Outlook outlook(session.plan(), reuse);
     if (o.farm.json && o.dry_run) {
       print_json(outlook.to_json(o.explain));
     } else if (!o.farm.json) {
@@ -292,7 +243,7 @@ Command bake_command() {
   for (Option& option : o->how.options()) options.push_back(std::move(option));
   options.push_back({"--fresh", "bake everything, by the parameters given here, whatever OUT.loom holds", &o->fresh});
   options.push_back({"--tolerance",
-                     "keep cells of the earlier bake of whose light up to this share may have changed; 0: none",
+                     "keep cells of the earlier bake of whose light an estimated share up to this has changed; 0: none",
                      &o->tolerance});
   options.push_back({"--dry-run", "bake nothing: print what there is to bake", &o->dry_run});
   options.push_back({"--explain", "print why each cell is baked", &o->explain});

@@ -24,6 +24,11 @@ BakeParams BakeOptions::params(const BakeParams* earlier) const {
   const auto set = [](auto* value, const auto& given) {
     if (given) *value = *given;
   };
+  // One of each pair decides: what an earlier bake had of the other must not.
+  if (spacing_) p.probes = 0;
+  if (probes_) p.spacing = 0;
+  if (texels_per_metre_) p.lightmap_size = 0;
+  if (lightmap_size_) p.texels_per_metre = 0;
   set(&p.spacing, spacing_);
   set(&p.order, order_);
   set(&p.probes, probes_);
@@ -43,7 +48,9 @@ absl::Status BakeOptions::check() const {
   if (!method_.empty() && method_ != "default" && method_ != "sl17") {
     return absl::InvalidArgumentError("--method must be default or sl17");
   }
-  return check_params(params(nullptr));
+  BakeParams p = params(nullptr);
+  if (method_.empty() && probes_) p.method = BakeMethod::kSl17;  // it may be the earlier bake's
+  return check_params(p);
 }
 
 }  // namespace lightloom

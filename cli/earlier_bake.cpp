@@ -1,27 +1,26 @@
 #include "cli/earlier_bake.h"
 
-#include <algorithm>
-#include <filesystem>
+#include <atomic>
 #include <map>
-#include <system_error>
 
 #include "core/asset/asset.h"
 #include "core/bake/bake_traces.h"
 #include "core/bake/plan.h"
-#include "core/bake/reuse.h"
+#include "core/base/parallel.h"
 #include "core/base/version.h"
 
 namespace lightloom {
 namespace {
 
-/// Their bytes are checked when they are fetched into the new asset.
+/// Whole and undamaged: a rebake names them again, and nobody else may have them.
 bool has_all_chunks(const EarlierBake& bake) {
   const ChunkStore store = chunk_store(bake.loom);
   const std::vector<ChunkRef> chunks = chunks_of(bake.manifest);
-  return std::all_of(chunks.begin(), chunks.end(), [&](const ChunkRef& chunk) {
-    std::error_code error;
-    return std::filesystem::file_size(store.path(chunk.digest), error) == chunk.size && !error;
+  std::atomic<bool> all{true};
+  parallel_for(chunks.size(), {}, [&](uint64_t i) {
+    if (all && !store.get(chunks[i]).ok()) all = false;
   });
+  return all;
 }
 
 /// Fills in the traces, or says why they are of no use.
@@ -33,8 +32,7 @@ absl::Status read_results(EarlierBake* bake) {
   if (absl::IsNotFound(traces.status())) return absl::NotFoundError("it has no traces");
   const absl::StatusOr<BakeTraces> decoded = traces.ok() ? decode_bake_traces(*traces) : traces.status();
   if (!decoded.ok()) return absl::DataLossError("its traces are damaged");
-  if (!has_all_chunks(*bake)) return absl::DataLossError("some of its chunks are missing");
-  bake->stale = stale_share(*decoded);
+  if (!has_all_chunks(*bake)) return absl::DataLossError("some of its chunks are missing or damaged");
   bake->traces = *std::move(traces);
   return absl::OkStatus();
 }

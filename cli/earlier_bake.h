@@ -15,11 +15,10 @@ struct EarlierBake {
   Manifest manifest;
   std::vector<uint8_t> traces;  ///< encode_bake_traces(); empty: no result can be used again
   std::string why_not;          ///< why the traces are empty
-  double stale = 0;             ///< stale_share() of the traces
   double tolerance = 0;         ///< up to which its results may be kept stale: the caller's choice
 };
 
-/// Nothing if there is no asset that this program can read: then the next bake knows nothing.
+/// Nothing if there is no asset, or one whose manifest this program cannot read: then the next bake knows nothing.
 std::optional<EarlierBake> find_earlier_bake(const std::string& loom);
 
 /// Whether a bake of the scene by these parameters would give the very same manifest: nothing that matters has changed.

@@ -159,10 +159,13 @@ absl::Status FarmClient::upload_chunks(const EarlierBake& earlier, std::vector<D
   const auto missing = connection_->blobs.find_missing(digests);
   if (!missing.ok()) return in_words(missing.status());
   const ChunkStore store = chunk_store(earlier.loom);
+  constexpr size_t kTogether = 32;
+  std::vector<std::vector<uint8_t>> together;
   for (const Digest& digest : *missing) {
-    LL_ASSIGN_OR_RETURN(const auto bytes, store.get(chunks[digest]));
-    const auto sent = connection_->blobs.upload(bytes);
-    if (!sent.ok()) return in_words(sent.status());
+    LL_ASSIGN_OR_RETURN(together.emplace_back(), store.get(chunks[digest]));
+    if (together.size() < kTogether && digest != missing->back()) continue;
+    LL_RETURN_IF_ERROR(in_words(connection_->blobs.upload(together)));
+    together.clear();
   }
   inputs->insert(inputs->end(), digests.begin(), digests.end());
   return absl::OkStatus();

@@ -69,6 +69,7 @@ struct Summary {
   uint64_t receivers = 0, bytes = 0, relight = 0, surface = 0, cell = 0;
   double coefficients = 0, probes_per_cluster = 0, error2 = 0, unseen = 0;
   uint32_t max_rank = 0;
+  uint64_t traces = 0;           ///< bytes beside the asset; for rebakes
   uint64_t above_threshold = 0;  ///< clusters whose error stays above the threshold at the greatest rank
 };
 
@@ -124,7 +125,8 @@ nlohmann::json to_json(const Manifest& m, const Summary& s, bool with_cells) {
       {"clusters_above_threshold", s.above_threshold},
       {"error", std::sqrt(s.error2)},
       {"unseen_fraction", s.unseen},
-      {"bytes", {{"total", s.bytes}, {"cells", s.cell}, {"relight", s.relight}, {"surfaces", s.surface}}}};
+      {"bytes",
+       {{"total", s.bytes}, {"cells", s.cell}, {"relight", s.relight}, {"surfaces", s.surface}, {"traces", s.traces}}}};
   if (with_cells) {
     for (const CellEntry& c : m.cells) {
       out["cell_list"].push_back({{"level", c.level},
@@ -149,6 +151,9 @@ void print(const Options& o, const Manifest& m, const Summary& s) {
   std::printf("  level     %zu objects, %.1f × %.1f × %.1f m, lightmap %d×%d\n", m.objects.size(),
               static_cast<double>(m.bounds.size().x), static_cast<double>(m.bounds.size().y),
               static_cast<double>(m.bounds.size().z), m.width, m.height);
+  if (s.traces > 0) {
+    std::printf("  traces    %s besides, for rebakes\n", human_bytes(static_cast<double>(s.traces)).c_str());
+  }
   std::printf("  probes    %zu of order %d, spacing %.3g m, %d relight rays each\n", m.probes.size(), m.params.order,
               static_cast<double>(m.params.spacing), m.params.relight_rays);
   std::printf("  receivers %llu in %zu cells, %zu clusters\n", static_cast<unsigned long long>(s.receivers),
@@ -181,7 +186,8 @@ absl::Status check(const Options& o) {
 
 absl::Status run(const Options& o) {
   LL_ASSIGN_OR_RETURN(const Manifest m, read_manifest(o.loom));
-  const Summary s = summarise(m);
+  Summary s = summarise(m);
+  if (const auto traces = read_traces(o.loom, m); traces.ok()) s.traces = traces->size();
   if (o.json) {
     print_json(to_json(m, s, o.cells));
   } else {

@@ -87,7 +87,9 @@ absl::StatusOr<BakeReport> local_bake(const RayTracer& tracer, const LocalBake& 
   // The level is at hand: no blob holds it, and its hash stands for it. Equal payloads, after the same bake, are one job.
   const std::vector<uint8_t> payload = encode_payload({scene_hash(tracer.scene()), bake.params});
   const SpawnedTask first = looks_back ? first_task(&results) : first_task();
-  const std::string request_id = Hasher().digest(sha256(payload)).digest(sha256(first.argument)).finish().hex();
+  const auto request_id = [&](uint64_t attempt) {
+    return Hasher().digest(sha256(payload)).digest(sha256(first.argument)).value(attempt).finish().hex();
+  };
 
   const std::string state = loom + ".partial";
   CoordinatorOptions options;
@@ -102,7 +104,11 @@ absl::StatusOr<BakeReport> local_bake(const RayTracer& tracer, const LocalBake& 
     LL_RETURN_IF_ERROR(client.upload(bake.earlier->traces).status());
     inputs.push_back(results.traces);
   }
-  LL_ASSIGN_OR_RETURN(RemoteJob job, client.submit(request_id, payload, first, inputs, loom, 0));
+  RemoteJob job;
+  uint64_t attempt = 0;
+  do {  // one that another edit has cancelled is begun again; what it had done is used
+    LL_ASSIGN_OR_RETURN(job, client.submit(request_id(attempt++), payload, first, inputs, loom, 0));
+  } while (job.state == "cancelled");
   for (const RemoteJob& other : earlier) {  // of another level, or other parameters
     if (other.id != job.id && !other.ended()) LL_RETURN_IF_ERROR(client.cancel(other.id).status());
   }

@@ -8,12 +8,11 @@
 #include <system_error>
 
 #include "cli/command.h"
-#include "cli/earlier_bake.h"
 #include "cli/files.h"
 #include "cli/print_json.h"
 #include "cli/progress.h"
 #include "core/asset/asset.h"
-#include "core/bake/plan.h"
+#include "core/bake/bake.h"
 #include "core/base/text.h"
 #include "core/base/version.h"
 #include "core/scene/gltf.h"
@@ -59,11 +58,12 @@ absl::Status verify(const Options& o, Orphans* orphans) {
     return absl::FailedPreconditionError(o.loom + " was baked by method version " + printable(m.method_version) +
                                          ", this is " + std::string(kMethodVersion) + "; bake again");
   }
-  if (const auto earlier = find_earlier_bake(o.loom); earlier && earlier->stale > 0) {
+  if (const BakeReport report = report_of(m); report.cells_stale > 0) {
     char share[32];
-    std::snprintf(share, sizeof share, "%.2g %%", 100 * earlier->stale);
-    return absl::FailedPreconditionError(o.loom + " was baked with a tolerance, and is stale by up to " + share +
-                                         " of some cell's light; bake again without --tolerance");
+    std::snprintf(share, sizeof share, "%.2g %%", 100 * report.stale);
+    return absl::FailedPreconditionError(o.loom + " was baked with a tolerance: " + std::to_string(report.cells_stale) +
+                                         " of its cells are stale, by an estimated " + share +
+                                         " of their light at most; bake again without --tolerance");
   }
   if (!o.scene.empty()) {
     LL_ASSIGN_OR_RETURN(const Scene scene, load_gltf(o.scene));

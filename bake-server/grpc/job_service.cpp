@@ -13,7 +13,7 @@ namespace lightloom {
 namespace {
 
 constexpr size_t kMaxRequestId = 64, kMaxClient = 64, kMaxName = 256;
-constexpr int kMaxInputs = 1024;
+constexpr int kMaxInputs = 50'000;  // 1.7 MB: a rebake names all chunks of the earlier asset
 constexpr uint32_t kMaxPage = 1000;
 
 v1::Job::State to_proto(JobState state) {
@@ -74,7 +74,7 @@ absl::StatusOr<NewJob> to_job(const v1::SubmitRequest& request, const ServerInfo
   if (request.client().size() > kMaxClient || request.name().size() > kMaxName) {
     return absl::InvalidArgumentError("a client's name has at most 64 bytes, a job's at most 256");
   }
-  if (request.inputs_size() > kMaxInputs) return absl::InvalidArgumentError("a job has at most 1024 inputs");
+  if (request.inputs_size() > kMaxInputs) return absl::InvalidArgumentError("a job has at most 50000 inputs");
   NewJob job;
   job.request_id = request.request_id();
   job.client = request.client();

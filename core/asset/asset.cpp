@@ -114,7 +114,7 @@ absl::StatusOr<std::vector<uint8_t>> read_traces(const std::filesystem::path& lo
     bytes.resize(bytes.size() - seal.bytes.size());
     if (sha256(bytes) == seal) return bytes;
   }
-  return absl::DataLossError(path.string() + " is damaged; remove it, and the next bake is a whole one");
+  return absl::DataLossError(path.string() + " is damaged; bake again");
 }
 
 absl::StatusOr<Manifest> read_manifest(const std::filesystem::path& loom) {

@@ -45,8 +45,7 @@ struct CellRecord {
   GridCell cell;
   Vec3 lo, hi;
   uint32_t receivers, first_cluster, clusters, first_probe, probes;
-  float error, unseen;
-  uint32_t reserved;
+  float error, unseen, stale;
   Digest chunk;
   uint64_t chunk_size;
 };
@@ -112,6 +111,7 @@ absl::Status validate(const Manifest& m) {
     if (!is_finite(c.bounds) || !std::isfinite(c.error) || !std::isfinite(c.unseen)) {
       return corrupt("a cell's bounds or quality are not finite");
     }
+    if (!(c.stale >= 0 && c.stale <= 1)) return corrupt("a cell's staleness is out of range");
     cluster += c.clusters;
   }
   if (cluster != m.clusters.size()) return corrupt("clusters without a cell");
@@ -150,7 +150,7 @@ std::vector<uint8_t> encode_manifest(const Manifest& m) {
   std::vector<CellRecord> cells;
   for (const CellEntry& c : m.cells) {
     cells.push_back({c.level, c.cell, c.bounds.lo, c.bounds.hi, c.receivers, c.first_cluster, c.clusters, c.first_probe,
-                     c.probes, c.error, c.unseen, 0, c.chunk.digest, c.chunk.size});
+                     c.probes, c.error, c.unseen, c.stale, c.chunk.digest, c.chunk.size});
   }
   std::vector<ClusterRecord> clusters;
   for (const ClusterEntry& c : m.clusters) {
@@ -248,7 +248,8 @@ absl::StatusOr<Manifest> decode_manifest(std::span<const uint8_t> bytes) {
                        c.probes,
                        {c.chunk, c.chunk_size},
                        c.error,
-                       c.unseen});
+                       c.unseen,
+                       c.stale});
   }
   for (const ClusterRecord& c : clusters) m.clusters.push_back({{c.lo, c.hi}, c.receivers, c.rank, c.probes, c.error});
   LL_RETURN_IF_ERROR(validate(m));

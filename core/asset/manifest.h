@@ -81,6 +81,7 @@ struct CellEntry {
   ChunkRef chunk;
   float error = 0;   ///< ‖T − T̃‖_F ÷ ‖T‖_F
   float unseen = 0;  ///< share of gather rays whose hit no linked probe sees
+  float stale = 0;   ///< estimated share of its light that edits since it was baked may have changed; 0: none
 };
 
 struct ClusterEntry {

@@ -88,6 +88,7 @@ absl::StatusOr<Manifest> assemble(const Plan& plan, const Scene& scene, const st
     entry.probes = static_cast<uint32_t>(c.probes.size());
     entry.chunk = c.chunk;
     entry.error = static_cast<float>(c.error);
+    entry.stale = c.stale;
     entry.unseen =
         c.gather_rays > 0 ? static_cast<float>(static_cast<double>(c.unseen) / static_cast<double>(c.gather_rays)) : 0;
     m.clusters.insert(m.clusters.end(), c.clusters.begin(), c.clusters.end());

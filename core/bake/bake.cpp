@@ -29,8 +29,6 @@ void count_reused(const Reuse& reuse, const Manifest& m, BakeReport* report) {
   for (size_t i = 0; i < reuse.cells.size(); ++i) {
     if (reuse.cells[i].why != ReuseItem::kHolds) continue;
     ++report->cells_reused;
-    if (reuse.cells[i].share > 0) ++report->cells_stale;
-    report->stale = std::max(report->stale, reuse.cells[i].share);
     report->clusters_reused += m.cells[i].clusters;
     report->rays_gather_reused += uint64_t{m.cells[i].receivers} * static_cast<uint64_t>(m.params.rays);
   }
@@ -52,6 +50,8 @@ BakeReport report_of(const Manifest& m) {
     r.receivers += c.receivers;
     r.rays_gather += rays;
     r.unseen += static_cast<uint64_t>(std::llround(static_cast<double>(c.unseen) * static_cast<double>(rays)));
+    r.cells_stale += c.stale > 0;
+    r.stale = std::max(r.stale, static_cast<double>(c.stale));
     r.bytes_total += c.chunk.size;
     r.bytes_reconstruction += c.receivers * sizeof(uint16_t);
   }

@@ -23,7 +23,7 @@ struct BakeReport {
   double seconds_write = 0;
   uint64_t clusters_reused = 0, cells_reused = 0, probes_reused = 0;  ///< taken over from an earlier bake
   uint64_t cells_stale = 0;                                           ///< of them: kept although they may have changed
-  double stale = 0;                                                   ///< the largest share of one that may
+  double stale = 0;                                                   ///< the largest CellEntry::stale
   uint64_t bytes_total = 0, bytes_projection = 0, bytes_reconstruction = 0, bytes_relight = 0;
 };
 

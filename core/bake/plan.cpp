@@ -25,7 +25,7 @@ absl::Status check_spacing(float spacing, const Aabb& bounds) {
   const double least = std::max(side / kMostCells, farthest / kFarthest);
   if (spacing >= least && spacing <= 1e6f) return absl::OkStatus();
   return absl::InvalidArgumentError("--spacing is " + std::to_string(spacing) + " m; this level takes " +
-                                    std::to_string(least) + " to 1000000 m, or leave it out");
+                                    std::to_string(least) + " to 1000000 m, or 0: chosen from the level");
 }
 
 /// Octree over the world: the root is the same for every level, so a leaf depends on the receivers above it only.

@@ -57,12 +57,6 @@ absl::StatusOr<Reuse> find_reuse(const Plan& plan, const Scene& scene, const Wor
   return out;
 }
 
-double stale_share(const BakeTraces& traces) {
-  float most = 0;
-  for (const CellRecord& cell : traces.cells) most = std::max(most, cell.stale);
-  return static_cast<double>(most);
-}
-
 std::vector<uint32_t> dirty_first(std::span<const ReuseItem> items) {
   std::vector<uint32_t> dirty;
   for (uint32_t i = 0; i < items.size(); ++i) {

@@ -40,9 +40,6 @@ Reuse no_reuse(const Plan& plan);
 absl::StatusOr<Reuse> find_reuse(const Plan& plan, const Scene& scene, const WorldContents& now,
                                  const BakeTraces& earlier, double tolerance, const Parallel& parallel);
 
-/// The largest share of a cell that was kept stale.
-double stale_share(const BakeTraces& traces);
-
 /// Indices of those that do not hold, the largest share first, and in the plan's order among equals.
 std::vector<uint32_t> dirty_first(std::span<const ReuseItem> items);
 

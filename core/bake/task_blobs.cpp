@@ -150,6 +150,9 @@ absl::StatusOr<ReusedResults> decode_reused_results(std::span<const uint8_t> byt
   ReusedResults reused{header.traces, r.array<ReusedResults::Item>(header.cells),
                        r.array<ReusedResults::Item>(header.probes)};
   if (!r.at_end()) return corrupt("list of reused results", "its length does not match its counts");
+  for (const ReusedResults::Item& item : reused.cells) {
+    if (!(item.stale >= 0 && item.stale <= 1)) return corrupt("list of reused results", "a staleness is out of range");
+  }
   return reused;
 }
 

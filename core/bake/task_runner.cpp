@@ -228,6 +228,11 @@ class Assembly {
     LL_RETURN_IF_ERROR(complete("cell", have_cell_));
     LL_RETURN_IF_ERROR(complete("relight", have_relight_));
     LL_RETURN_IF_ERROR(complete("surfaces", have_surface_));
+    for (size_t i = 0; i < relight_.size(); ++i) {
+      if (relight_[i].probe != c_.session.plan().placement.probes[i].name()) {
+        return bad("relight " + std::to_string(i) + " is of another probe");
+      }
+    }
     return c_.session.finish(std::move(cells_), std::move(relight_), surfaces_);
   }
 
@@ -254,12 +259,14 @@ class Assembly {
   static absl::Status take_over(const std::string& kind, const std::vector<ReusedResults::Item>& reused,
                                 std::vector<T> earlier, std::vector<T>* all, std::vector<bool>* have) {
     if (reused.size() != all->size()) return bad("what 'plan' found to hold does not fit the plan");
+    std::vector<bool> taken(earlier.size());
     for (size_t i = 0; i < reused.size(); ++i) {
       if (reused[i].earlier == ReusedResults::Item::kNone) continue;
       if (reused[i].earlier >= earlier.size())
         return bad("'plan' names a " + kind + " that the earlier bake does not have");
       if ((*have)[i]) return bad("it has " + kind + " " + std::to_string(i) + " twice");
-      (*have)[i] = true;
+      if (taken[reused[i].earlier]) return bad("'plan' uses a " + kind + " of the earlier bake twice");
+      (*have)[i] = taken[reused[i].earlier] = true;
       (*all)[i] = std::move(earlier[reused[i].earlier]);
     }
     return absl::OkStatus();

@@ -84,7 +84,8 @@ Digest cell_key(const Plan& plan, const Scene& scene, const PlannedCell& cell) {
 
 Digest relight_key(const Plan& plan, const Probe& probe) {
   Hasher h;
-  h.string("relight").string(kMethodVersion).value(plan.params.relight_rays).value(plan.layout.mode);
+  h.string("relight").string(kMethodVersion).value(plan.params.relight_rays);
+  h.value(plan.layout.mode).value(plan.layout.texels_per_metre);
   h.bytes(&probe.cell, sizeof probe.cell).value(probe.slot).bytes(&probe.position, sizeof probe.position);
   return h.finish();
 }

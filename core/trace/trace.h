@@ -19,7 +19,7 @@ inline double share_of(uint8_t stored) { return stored == 0 ? 0 : std::ldexp(1.0
 /// The result depends on nothing outside of its cells; but if rays left the grid, also on there being nothing there.
 struct Trace {
   WorldGrid grid;
-  uint8_t sky = 0;  ///< share of rays that left the grid
+  uint8_t sky = 0;  ///< share of rays that left the grid; 1 at least if anything did
   /// Runs of cells in the grid's order: the low four bits are their stored share, the high four how many less one.
   std::vector<uint8_t> runs;
 

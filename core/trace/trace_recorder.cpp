@@ -115,6 +115,8 @@ void TraceRecorder::draw(const Aabb& from, const Aabb& to, uint32_t rays) {
     sweep.hi[0][a] = in_cells(from.hi[a] + margin_);
     sweep.lo[1][a] = in_cells(to.lo[a] - margin_);
     sweep.hi[1][a] = in_cells(to.hi[a] + margin_);
+    const float cells = static_cast<float>(grid_.size[static_cast<size_t>(a)]);
+    left_grid_ |= std::min(sweep.lo[0][a], sweep.lo[1][a]) < 0 || std::max(sweep.hi[0][a], sweep.hi[1][a]) > cells;
   }
   draw(sweep, rays);
 }
@@ -153,7 +155,7 @@ void TraceRecorder::draw(const Sweep& s, uint32_t rays) {
     }
     if (!inside) continue;
     for (uint32_t i = begin[0]; i < end[0]; ++i) {
-      uint32_t* row = &crossed_[static_cast<uint32_t>(slice) * stride[axis] + i * stride[across[0]]];
+      uint64_t* row = &crossed_[static_cast<uint32_t>(slice) * stride[axis] + i * stride[across[0]]];
       for (uint32_t j = begin[1]; j < end[1]; ++j) row[j * stride[across[1]]] += rays;
     }
   }
@@ -198,10 +200,11 @@ Trace TraceRecorder::finish(std::span<const Vec3> probes) {
   }
   Trace trace;
   trace.grid = grid_;
-  trace.sky = stored_share(skies, rays);
+  // Not only rays to the sky leave the grid: probes may stand outside, and searches reach out.
+  trace.sky = std::max<uint8_t>(stored_share(skies, rays), left_grid_ ? 1 : 0);
   std::vector<uint8_t> shares;
   shares.reserve(crossed_.size());
-  for (const uint32_t count : crossed_) shares.push_back(stored_share(count, rays));
+  for (const uint64_t count : crossed_) shares.push_back(stored_share(count, rays));
   trace.runs = pack_runs(shares);
   return trace;
 }

@@ -61,7 +61,8 @@ class TraceRecorder {
   absl::flat_hash_map<uint64_t, Place> place_of_;
   std::vector<Seen> places_;
   std::vector<uint64_t> asked_;
-  std::vector<uint32_t> crossed_;  // rays, per cell
+  std::vector<uint64_t> crossed_;  // rays, per cell
+  bool left_grid_ = false;         // something was drawn that is not all in the grid
 };
 
 }  // namespace lightloom

@@ -1,7 +1,6 @@
 #include "core/trace/world_contents.h"
 
-#include <algorithm>
-#include <cmath>
+#include <bit>
 
 #include "core/base/hash.h"
 #include "core/base/overlap.h"
@@ -46,12 +45,9 @@ WorldContents contents_of(const Scene& scene, const AtlasLayout& layout, const R
   const auto add_triangle = [&](const std::array<Vec3, 3>& corners, const ContentHash& hash) {
     Aabb box;
     for (const Vec3 corner : corners) box.extend(corner);
-    // A cell more on each side: what lies in a face is in both.
-    GridCell lo = grid.cell_at(box.lo), hi = grid.cell_at(box.hi);
-    for (size_t a = 0; a < 3; ++a) {
-      lo[a] = std::max(lo[a] - 1, grid.lo[a]);
-      hi[a] = std::min(hi[a] + 1, grid.lo[a] + static_cast<int32_t>(grid.size[a]) - 1);
-    }
+    // More than cells are widened by.
+    const Vec3 around = Vec3{side, side, side} * (kWider - 1);
+    const GridCell lo = grid.nearest(box.lo - around), hi = grid.nearest(box.hi + around);
     GridCell c;
     for (c[0] = lo[0]; c[0] <= hi[0]; ++c[0]) {
       for (c[1] = lo[1]; c[1] <= hi[1]; ++c[1]) {
@@ -77,9 +73,9 @@ WorldContents contents_of(const Scene& scene, const AtlasLayout& layout, const R
     }
     for (uint32_t r = receivers.ranges[o].begin; r < receivers.ranges[o].end; ++r) {
       const Receiver& receiver = receivers.all[r];
-      // Where it lies follows from its object and the open parts of its texel.
-      all[grid.index(grid.nearest(receiver.point.position))].receivers.add(
-          mixer((uint64_t{1} << 63) | uint64_t{receiver.parts} << 32 | receiver.key));
+      uint64_t item = uint64_t{receiver.parts} << 32 | receiver.key;
+      for (int a = 0; a < 3; ++a) item = hash_combine(item, std::bit_cast<uint32_t>(receiver.point.position[a]));
+      all[grid.index(grid.nearest(receiver.point.position))].receivers.add(mixer(item));
     }
   }
   WorldContents out;

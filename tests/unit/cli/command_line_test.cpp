@@ -206,6 +206,7 @@ TEST_F(CommandLine, VerifyCountsChunksOfOtherBakes) {
 TEST_F(CommandLine, InspectSaysHowManyClustersMissTheThreshold) {
   const std::string loom = baked();
   EXPECT_THAT(run({"inspect", loom}).out, HasSubstr("end above 0.02: --max-rank 4"));
+  EXPECT_THAT(run({"inspect", loom}).out, HasSubstr("besides, for rebakes"));
   EXPECT_THAT(run({"inspect", loom, "--json"}).out, HasSubstr("clusters_above_threshold"));
 }
 
@@ -305,11 +306,17 @@ TEST_F(CommandLine, ARebakeTakesOverWhatStillHolds) {
   EXPECT_EQ(manifest(loom), still) << "a dry run writes nothing";
 
   // First what matters, on record; then the rest.
-  EXPECT_THAT(bake({edited, "-o", loom, "--tolerance", "0.9"}).out, HasSubstr("are stale"));
+  EXPECT_THAT(bake({edited, "-o", loom, "--tolerance", "0.9"}).out, HasSubstr("of the cells are stale"));
+  EXPECT_THAT(bake({edited, "-o", loom, "--tolerance", "0.9"}).out, HasSubstr("of the cells are stale"));
   fails(1, {"verify", loom, "--scene", edited}, "with a tolerance");
   bake({edited, "-o", loom});
   EXPECT_EQ(run({"verify", loom, "--scene", edited}).code, 0);
   bake(with_how({edited, "-o", whole}));
+  EXPECT_EQ(manifest(loom), manifest(whole));
+
+  // A manifest that cannot be read says nothing of its parameters.
+  test::write(fs::path(loom) / "manifest", "no manifest");
+  EXPECT_THAT(bake(with_how({edited, "-o", loom})).err, HasSubstr("baked anew: its manifest cannot be read"));
   EXPECT_EQ(manifest(loom), manifest(whole));
 
   // An asset that has lost something is baked anew, and whole.
@@ -319,10 +326,14 @@ TEST_F(CommandLine, ARebakeTakesOverWhatStillHolds) {
     }
     return fs::path();
   }();
-  fs::remove(chunk);
-  EXPECT_THAT(bake({edited, "-o", whole}).err, HasSubstr("baked anew: some of its chunks are missing"));
-  EXPECT_TRUE(fs::exists(chunk));
-  EXPECT_EQ(manifest(loom), manifest(whole));
+  const std::string bytes = text_of(chunk);
+  for (const bool damaged : {false, true}) {
+    fs::remove(chunk);
+    if (damaged) write(chunk, std::string(bytes.size(), 'x'));
+    EXPECT_THAT(bake({edited, "-o", whole}).err, HasSubstr("baked anew: some of its chunks are missing or damaged"));
+    EXPECT_EQ(text_of(chunk), bytes);
+    EXPECT_EQ(manifest(loom), manifest(whole));
+  }
   EXPECT_THAT(bake({edited, "-o", whole, "--fresh", "--rays", "4", "--json"}).out, HasSubstr("\"cells_reused\":0"));
 }
 

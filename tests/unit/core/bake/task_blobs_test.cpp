@@ -68,6 +68,7 @@ TEST(TaskBlobs, RefuseOtherLengths) {
   test::expect_exact_length(reused, decode_reused_results);
   test::expect_count_checked(reused, 40, decode_reused_results);
   test::expect_count_checked(reused, 44, decode_reused_results);
+  EXPECT_FALSE(decode_reused_results(with(reused, 52, -1.0f)).ok()) << "staleness is a share";
 }
 
 TEST(TaskBlobs, PayloadRefusesBadParametersAndOtherMethods) {

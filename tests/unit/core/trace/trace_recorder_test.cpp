@@ -96,6 +96,26 @@ TEST(TraceRecorder, HoldsTheWayOfEveryProbeThatWasAsked) {
   }
 }
 
+TEST(TraceRecorder, SaysThatSomethingLeftTheGrid) {
+  // A probe that stands outside, and a search that reaches out; rays to the sky there are none.
+  const Vec3 inside{0, 1, 0}, outside{9.5f, 2, 0};
+  TraceRecorder asked(grid(), 1);
+  asked.from({inside, inside});
+  const auto place = asked.hit({5.9f, 1, 0}, 0);
+  asked.ask(place, 0);
+  EXPECT_EQ(asked.finish({&outside, 1}).sky, 1);
+
+  TraceRecorder searched(grid(), 0);
+  searched.from({inside, inside});
+  searched.hit({5.9f, 1, 0}, 3);
+  EXPECT_EQ(searched.finish({}).sky, 1);
+
+  TraceRecorder neither(grid(), 1);
+  neither.from({inside, inside});
+  neither.ask(neither.hit({5.9f, 1, 0}, 0.5f), 0);
+  EXPECT_EQ(neither.finish({&inside, 1}).sky, 0);
+}
+
 TEST(TraceRecorder, SaysLittleMoreThanIsTrue) {
   TraceRecorder recorder(grid(), 0);
   recorder.from({{-3.5f, 0.5f, 0.5f}, {-3.5f, 0.5f, 0.5f}});
