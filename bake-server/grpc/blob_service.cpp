@@ -79,24 +79,24 @@ class Reading final : public grpc::ServerWriteReactor<v1::ReadResponse> {
       return;
     }
     digest_ = *digest;
-    next();
+    // What is written here would be read after the constructor, by whom the lock does not hold up.
+    StartSendInitialMetadata();
   }
 
-  void OnWriteDone(bool ok) override {
-    const auto lock = hand_over_.hold();
-    if (ok) {
-      next();
-    } else {
-      Finish(grpc::Status::CANCELLED);
-    }
-  }
+  void OnSendInitialMetadataDone(bool ok) override { go_on(ok); }
+  void OnWriteDone(bool ok) override { go_on(ok); }
   void OnDone() override {
     hand_over_.hold().unlock();
     delete this;
   }
 
  private:
-  void next() {
+  void go_on(bool ok) {
+    const auto lock = hand_over_.hold();
+    if (!ok) {
+      Finish(grpc::Status::CANCELLED);
+      return;
+    }
     const auto bytes = store_->read(digest_, offset_, kPiece);
     if (!bytes.ok() || bytes->empty()) {
       Finish(to_grpc(bytes.status()));

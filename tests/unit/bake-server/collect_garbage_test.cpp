@@ -196,7 +196,7 @@ TEST_F(CollectGarbage, NoPromiseIsBrokenByAnotherProcess) {
     for (;;) (void)collect_garbage(state_.path(), none, {});
   }
   size_t promised = 0, missing = 0;
-  for (int round = 0; round < kRounds || missing == 0; ++round) {
+  for (int round = 0; round < kRounds || missing == 0 || promised == 0; ++round) {
     std::vector<Digest> all;
     for (int i = 0; i < kBlobs; ++i) {
       all.push_back(value(store_->put(bytes_of(absl::StrCat("blob ", i)))));
@@ -222,7 +222,6 @@ TEST_F(CollectGarbage, NoPromiseIsBrokenByAnotherProcess) {
   int status = 0;
   EXPECT_EQ(::waitpid(collector, &status, 0), collector);
   EXPECT_EQ(WTERMSIG(status), SIGKILL) << "it collected until the end";
-  EXPECT_GT(promised, 0u);
 }
 
 }  // namespace
