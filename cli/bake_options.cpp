@@ -48,9 +48,7 @@ absl::Status BakeOptions::check() const {
   if (!method_.empty() && method_ != "default" && method_ != "sl17") {
     return absl::InvalidArgumentError("--method must be default or sl17");
   }
-  BakeParams p = params(nullptr);
-  if (method_.empty() && probes_) p.method = BakeMethod::kSl17;  // it may be the earlier bake's
-  return check_params(p);
+  return check_params(params(nullptr));
 }
 
 }  // namespace lightloom

@@ -229,7 +229,7 @@ TEST_F(CommandLine, TheDecoderHasNoTimesAndSimdHas) {
 TEST_F(CommandLine, ABakeThatWasStoppedGoesOn) {
   const std::string loom = path("long.loom");
   const auto bake_to = [&](const std::string& out) -> std::vector<std::string> {
-    return {"bake",           scene_, "-o",        out, "--texels-per-metre", "4",   "--rays",    "256",
+    return {"bake",           scene_, "-o",        out, "--texels-per-metre", "4",   "--rays",    "1024",
             "--relight-rays", "64",   "--threads", "1", "--cell-receivers",   "128", "--spacing", "2"};
   };
   const auto only_folder = [](const fs::path& folder) {
