@@ -1,6 +1,5 @@
 #include "cli/outlook.h"
 
-#include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -52,10 +51,12 @@ void Outlook::print(bool explain) const {
               plan_.placement.probes.size());
   if (!explain) return;
   for (const uint32_t i : dirty_first(reuse_.cells)) {
-    const PlannedCell& cell = plan_.cells[i];
-    const double side = std::ldexp(1.0, cell.level);
-    std::printf("  %g m cell at (%g, %g, %g), %zu receivers: %s\n", side, side * cell.cell[0], side * cell.cell[1],
-                side * cell.cell[2], cell.receivers.size(), why(reuse_.cells[i]).c_str());
+    Aabb bounds;
+    for (const uint32_t r : plan_.cells[i].receivers) bounds.extend(plan_.receivers.all[r].point.position);
+    const Vec3 middle = bounds.center();
+    std::printf("  %zu receivers around (%.1f, %.1f, %.1f): %s\n", plan_.cells[i].receivers.size(),
+                static_cast<double>(middle.x), static_cast<double>(middle.y), static_cast<double>(middle.z),
+                why(reuse_.cells[i]).c_str());
   }
 }
 
