@@ -198,8 +198,7 @@ absl::Status run(const Options& o) {
   if (!anew.empty()) {
     std::fprintf(stderr, "lightloom: %s is baked anew: %s\n", escape_controls(o.output).c_str(), anew.c_str());
   }
-  if (earlier && !earlier->traces.empty() && report_of(earlier->manifest).stale <= earlier->tolerance && !o.dry_run &&
-      is_up_to_date(earlier->manifest, *level.scene, params)) {
+  if (earlier && !earlier->traces.empty() && !o.dry_run && is_up_to_date(*earlier, *level.scene, params)) {
     BakeReport report = report_of(earlier->manifest);
     report.cells_reused = report.cells;
     report.clusters_reused = report.clusters;

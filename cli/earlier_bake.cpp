@@ -1,5 +1,6 @@
 #include "cli/earlier_bake.h"
 
+#include <algorithm>
 #include <atomic>
 #include <map>
 
@@ -47,7 +48,10 @@ std::optional<EarlierBake> find_earlier_bake(const std::string& loom) {
   return bake;
 }
 
-bool is_up_to_date(const Manifest& m, const Scene& scene, const BakeParams& params) {
+bool is_up_to_date(const EarlierBake& bake, const Scene& scene, const BakeParams& params) {
+  const Manifest& m = bake.manifest;
+  const auto too_stale = [&](const CellEntry& c) { return static_cast<double>(c.stale) > bake.tolerance; };
+  if (std::any_of(m.cells.begin(), m.cells.end(), too_stale)) return false;
   if (m.method_version != kMethodVersion || m.params != params || m.scene_hash != scene_hash(scene)) return false;
   // Names, and the order of objects, are in no hash.
   std::map<Digest, const ObjectEntry*> entries;

@@ -21,7 +21,8 @@ struct EarlierBake {
 /// Nothing if there is no asset, or one whose manifest this program cannot read: then the next bake knows nothing.
 std::optional<EarlierBake> find_earlier_bake(const std::string& loom);
 
-/// Whether a bake of the scene by these parameters would give the very same manifest: nothing that matters has changed.
-bool is_up_to_date(const Manifest& manifest, const Scene& scene, const BakeParams& params);
+/// Whether a bake of the scene by these parameters would give the very same manifest: nothing that matters has changed, and
+/// no cell is staler than the tolerance.
+bool is_up_to_date(const EarlierBake& bake, const Scene& scene, const BakeParams& params);
 
 }  // namespace lightloom

@@ -6,7 +6,6 @@
 #include "cli/files.h"
 #include "cli/interrupt.h"
 #include "cli/job_progress.h"
-#include "cli/level.h"
 #include "core/base/file.h"
 #include "core/base/stopwatch.h"
 
@@ -39,7 +38,6 @@ absl::Status check_farm_level(const std::string& scene) {
 
 absl::StatusOr<RemoteJob> submit_level(FarmClient* farm, const std::string& scene, const BakeParams& params,
                                        const EarlierBake* earlier, const std::string& name, int32_t priority) {
-  LL_RETURN_IF_ERROR(load_level(scene).status());
   LL_ASSIGN_OR_RETURN(const std::vector<uint8_t> bytes, read_file(scene));
   ProgressBar bar;
   return farm->submit(bytes, params, earlier, name.empty() ? std::filesystem::path(scene).stem().string() : name,

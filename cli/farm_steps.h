@@ -12,7 +12,8 @@ namespace lightloom {
 /// Before any work: there is such a level, and it is a .glb, which holds all of it.
 absl::Status check_farm_level(const std::string& scene);
 
-/// What is wrong with the level is said here, not by a worker. `name` empty: the level's. `earlier` may be null.
+/// REQUIRES: the level was loaded, so that what is wrong with it was said here, not by a worker. `name` empty: the level's.
+/// `earlier` may be null.
 absl::StatusOr<RemoteJob> submit_level(FarmClient* farm, const std::string& scene, const BakeParams& params,
                                        const EarlierBake* earlier, const std::string& name, int32_t priority);
 

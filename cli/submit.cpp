@@ -10,6 +10,7 @@
 #include "cli/farm_steps.h"
 #include "cli/files.h"
 #include "cli/interrupt.h"
+#include "cli/level.h"
 #include "cli/print_json.h"
 
 namespace lightloom {
@@ -39,6 +40,7 @@ absl::Status run(const Options& o) {
           "; leave out --from");
     }
   }
+  LL_RETURN_IF_ERROR(load_level(o.scene).status());
   FarmClient farm = o.farm->connect();
   const BakeParams params = o.how.params(earlier ? &earlier->manifest.params : nullptr);
   LL_ASSIGN_OR_RETURN(const RemoteJob job,

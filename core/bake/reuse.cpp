@@ -28,7 +28,7 @@ ReuseItem look_up(const Digest& key, const std::vector<Record>& earlier, const s
 }  // namespace
 
 Reuse no_reuse(const Plan& plan) {
-  return {std::vector<ReuseItem>(plan.cells.size()), std::vector<ReuseItem>(plan.placement.probes.size()), 0};
+  return {std::vector<ReuseItem>(plan.cells.size()), std::vector<ReuseItem>(plan.placement.probes.size())};
 }
 
 absl::StatusOr<Reuse> find_reuse(const Plan& plan, const Scene& scene, const WorldContents& now,
@@ -37,7 +37,6 @@ absl::StatusOr<Reuse> find_reuse(const Plan& plan, const Scene& scene, const Wor
   const auto cells = by_key(earlier.cells), probes = by_key(earlier.probes);
   const auto& planned = plan.placement.probes;
   Reuse out;
-  out.changed_cells = changes.cells();
   out.cells.resize(plan.cells.size());
   out.probes.resize(planned.size());
   const bool done = parallel_for(out.cells.size() + out.probes.size(), parallel, [&](uint64_t i) {

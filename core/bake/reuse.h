@@ -28,7 +28,6 @@ struct ReuseItem {
 struct Reuse {
   std::vector<ReuseItem> cells;   ///< by Plan::cells
   std::vector<ReuseItem> probes;  ///< by PlacementResult::probes: their relight sets
-  uint64_t changed_cells = 0;     ///< of the world
 };
 
 /// Of a bake that nothing went before.

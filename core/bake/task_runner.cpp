@@ -80,19 +80,7 @@ absl::StatusOr<BakeTraces> fetch_traces(const Context& c, const Digest& digest) 
   return decode_bake_traces(bytes);
 }
 
-/// What of the earlier bake, if the task names one, holds.
-absl::StatusOr<std::shared_ptr<const Reuse>> look_back(const Context& c) {
-  const Plan& plan = c.session.plan();
-  if (c.task.argument.empty()) return std::make_shared<const Reuse>(no_reuse(plan));
-  LL_ASSIGN_OR_RETURN(const EarlierResults earlier, decode_earlier_results(c.task.argument));
-  return c.session.reuse(
-      earlier, [&] { return fetch_traces(c, earlier.traces); }, c.control.stage("reuse"));
-}
-
-absl::StatusOr<ReusedResults> reused_results(const Context& c, const Reuse& reuse) {
-  ReusedResults out;
-  LL_ASSIGN_OR_RETURN(const EarlierResults earlier, decode_earlier_results(c.task.argument));
-  out.traces = earlier.traces;
+ReusedResults reused_results(const Digest& traces, const Reuse& reuse) {
   const auto held = [](const std::vector<ReuseItem>& items) {
     std::vector<ReusedResults::Item> out(items.size());
     for (size_t i = 0; i < items.size(); ++i) {
@@ -100,14 +88,11 @@ absl::StatusOr<ReusedResults> reused_results(const Context& c, const Reuse& reus
     }
     return out;
   };
-  out.cells = held(reuse.cells);
-  out.probes = held(reuse.probes);
-  return out;
+  return {traces, held(reuse.cells), held(reuse.probes)};
 }
 
 absl::StatusOr<TaskOutput> run_plan(const Context& c) {
   const Plan& plan = c.session.plan();
-  LL_ASSIGN_OR_RETURN(const auto reuse, look_back(c));
   PlanSummary summary;
   summary.plan = c.session.plan_digest();
   summary.receivers = plan.receivers.all.size();
@@ -117,10 +102,13 @@ absl::StatusOr<TaskOutput> run_plan(const Context& c) {
   TaskOutput out;
   LL_ASSIGN_OR_RETURN(const Digest blob, c.put(encode_plan_summary(summary)));
   out.outputs.push_back(blob);
+  auto reuse = std::make_shared<const Reuse>(no_reuse(plan));
   if (!c.task.argument.empty()) {
-    LL_ASSIGN_OR_RETURN(const ReusedResults reused, reused_results(c, *reuse));
-    LL_ASSIGN_OR_RETURN(const Digest reused_blob, c.put(encode_reused_results(reused)));
-    out.outputs.push_back(reused_blob);
+    LL_ASSIGN_OR_RETURN(const EarlierResults earlier, decode_earlier_results(c.task.argument));
+    const auto load = [&] { return fetch_traces(c, earlier.traces); };
+    LL_ASSIGN_OR_RETURN(reuse, c.session.reuse(earlier, load, c.control.stage("reuse")));
+    LL_ASSIGN_OR_RETURN(const Digest reused, c.put(encode_reused_results(reused_results(earlier.traces, *reuse))));
+    out.outputs.push_back(reused);
   }
 
   // What an edit may have changed most comes first; among equals the octree's order, as neighbours share what a worker
