@@ -79,6 +79,12 @@ absl::StatusOr<AssetIndex> AssetIndex::create(const Manifest& m, std::pmr::memor
   return index;
 }
 
+absl::StatusOr<std::shared_ptr<const AssetIndex>> AssetIndex::create_shared(const Manifest& manifest,
+                                                                            std::pmr::memory_resource* memory) {
+  LL_ASSIGN_OR_RETURN(AssetIndex index, create(manifest, memory));
+  return std::allocate_shared<const AssetIndex>(std::pmr::polymorphic_allocator<AssetIndex>(memory), std::move(index));
+}
+
 /// A counting sort of the pairs of cell and probe.
 void AssetIndex::list_cells_of_probes() {
   first_cell_.assign(probes_.size() + 1, 0);

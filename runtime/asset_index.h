@@ -42,6 +42,8 @@ class AssetIndex {
   };
 
   /// DataLoss: the manifest contradicts itself. Unimplemented: beyond this reader's limits.
+  static absl::StatusOr<std::shared_ptr<const AssetIndex>> create_shared(const Manifest& manifest,
+                                                                         std::pmr::memory_resource* memory);
   static absl::StatusOr<AssetIndex> create(const Manifest& manifest, std::pmr::memory_resource* memory);
 
   uint32_t order() const { return order_; }

@@ -1,12 +1,16 @@
 // What stands behind the C API: where the passes of a frame run.
 #pragma once
 
+#include <memory>
+#include <mutex>
 #include <span>
+#include <vector>
 
 #include "core/base/hash.h"
 #include "core/base/status.h"
 #include "core/base/vec.h"
 #include "runtime/asset_index.h"
+#include "runtime/detail.h"
 #include "runtime/include/lightloom.h"
 
 namespace lightloom {
@@ -19,21 +23,25 @@ enum class SurfaceInput { kDirect, kAlbedo, kEmission };
 /// Status codes stand for results as boundary.h says.
 class Backend {
  public:
+  explicit Backend(std::pmr::memory_resource* memory) : memory_(memory) {}
   virtual ~Backend() = default;
+  Backend(const Backend&) = delete;
+  Backend& operator=(const Backend&) = delete;
 
   /// Replaces the asset; after a failure there is none.
   virtual absl::Status load_manifest(std::span<const uint8_t> manifest) = 0;
   virtual void unload() = 0;
-  virtual bool loaded() const = 0;
+  bool loaded() const { return index_ != nullptr; }
 
   // REQUIRES for all below: loaded().
-  virtual const AssetIndex& index() const = 0;
-  virtual absl::Status load_chunk(const Digest& digest, std::span<const uint8_t> bytes) = 0;
-  virtual absl::Status unload_chunk(const Digest& digest) = 0;
+  const AssetIndex& index() const { return *index_; }
+  /// What is resident in another detail keeps to light the level until the frame that has all of the new one.
+  absl::Status load_chunk(const Digest& digest, std::span<const uint8_t> bytes, const Detail& detail = {});
+  absl::Status unload_chunk(const Digest& digest);
   /// `rgb` is 3·count finite values for elements [first, …); they exist.
   virtual void set(SurfaceInput input, uint64_t first, std::span<const float> rgb) = 0;
   virtual void set_environment(Vec3 radiance) = 0;
-  /// Also before a manifest is loaded; checked, smoothing in (0, 1].
+  /// Also before a manifest is loaded; checked, smoothing and fade in (0, 1].
   virtual absl::Status set_options(const lightloom_update_options& options) = 0;
   virtual void reset_feedback() = 0;
   virtual absl::Status update(uint32_t frames) = 0;
@@ -41,6 +49,28 @@ class Backend {
   virtual absl::Status read_irradiance(std::span<float> rgb) = 0;
   virtual lightloom_counts counts() const = 0;
   virtual lightloom_stats stats() const = 0;
+
+ protected:
+  /// For load_manifest and unload; null: no asset.
+  void use(std::shared_ptr<const AssetIndex> index);
+
+  // Any thread.
+  virtual bool resident(const AssetIndex::Target& target, const Detail& detail) const = 0;
+  virtual absl::Status load_surface(uint32_t object, const SurfaceChunk& chunk) = 0;
+  /// All rays of the chunk: surface elements, RelightChunk::kDead or kSky.
+  virtual absl::Status load_relight(uint32_t probe, std::span<const uint32_t> rays, const Detail& detail) = 0;
+  /// Limited to the rank already.
+  virtual absl::Status load_cell(uint32_t cell, const SourceCell& source, const Detail& detail) = 0;
+  virtual void unload_target(const AssetIndex::Target& target) = 0;
+
+  std::pmr::memory_resource* const memory_;
+
+ private:
+  SurfaceKeys keys_of(uint32_t object) const;
+
+  std::shared_ptr<const AssetIndex> index_;
+  mutable std::mutex keys_mutex_;
+  std::vector<SurfaceKeys> keys_;  ///< per object; null: its surface is not resident
 };
 
 }  // namespace lightloom

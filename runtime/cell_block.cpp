@@ -120,12 +120,13 @@ absl::StatusOr<CellBlock> make_cell_block(const SourceCell& cell, uint64_t max_b
   return block;
 }
 
-std::pmr::vector<uint8_t> sh_table(uint32_t order, uint32_t rays, std::pmr::memory_resource* memory) {
+std::pmr::vector<uint8_t> sh_table(uint32_t order, uint32_t rays, std::span<const uint32_t> chosen,
+                                   std::pmr::memory_resource* memory) {
   const size_t stride = static_cast<size_t>(sh_stride(static_cast<int>(order)));
-  const size_t padded = (size_t{rays} + gpu::kRayTile - 1) / gpu::kRayTile * gpu::kRayTile;
+  const size_t padded = (chosen.size() + gpu::kRayTile - 1) / gpu::kRayTile * gpu::kRayTile;
   std::vector<float> table(padded * stride), y(stride);
-  for (uint32_t r = 0; r < rays; ++r) {
-    sh_evaluate(static_cast<int>(order), sphere_direction(r, rays), y);
+  for (size_t r = 0; r < chosen.size(); ++r) {
+    sh_evaluate(static_cast<int>(order), sphere_direction(chosen[r], rays), y);
     for (size_t j = 0; j < stride; ++j) table[(r / 4 * stride + j) * 4 + r % 4] = y[j];
   }
   std::pmr::vector<uint8_t> bytes(table.size() * sizeof(float), memory);

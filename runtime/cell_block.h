@@ -23,8 +23,9 @@ struct CellBlock {
 absl::StatusOr<CellBlock> make_cell_block(const SourceCell& cell, uint64_t max_bytes,
                                           std::pmr::memory_resource* memory);
 
-/// Y_j(ω_r) for the relight pass: [r/4][j][r%4], j < sh_stride(order), r up to a multiple of gpu::kRayTile;
-/// padding 0.
-std::pmr::vector<uint8_t> sh_table(uint32_t order, uint32_t rays, std::pmr::memory_resource* memory);
+/// Y_j(ω_r) of the chosen of N relight rays, for the relight pass: [r/4][j][r%4], j < sh_stride(order), r up to a
+/// multiple of gpu::kRayTile; padding 0.
+std::pmr::vector<uint8_t> sh_table(uint32_t order, uint32_t rays, std::span<const uint32_t> chosen,
+                                   std::pmr::memory_resource* memory);
 
 }  // namespace lightloom

@@ -189,6 +189,19 @@ lightloom_result lightloom_load_chunk(lightloom_runtime* runtime, const uint8_t 
   });
 }
 
+lightloom_result lightloom_load_chunk_part(lightloom_runtime* runtime, const uint8_t digest[32], const void* bytes,
+                                           uint64_t size, const lightloom_detail* detail) {
+  return with_asset(runtime, [&](Backend& backend) -> absl::Status {
+    if (digest == nullptr || bytes == nullptr) return absl::InvalidArgumentError("the digest or the chunk is null");
+    if (detail == nullptr || detail->struct_size < sizeof *detail || detail->reserved != 0 ||
+        (detail->flags & ~uint32_t{LIGHTLOOM_DETAIL_COARSE_RAYS}) != 0) {
+      return absl::InvalidArgumentError("lightloom_detail is null, its struct_size is wrong or a flag is unknown");
+    }
+    return backend.load_chunk(lightloom::digest_of(digest), {static_cast<const uint8_t*>(bytes), size},
+                              {detail->max_rank, (detail->flags & LIGHTLOOM_DETAIL_COARSE_RAYS) == 0});
+  });
+}
+
 lightloom_result lightloom_unload_chunk(lightloom_runtime* runtime, const uint8_t digest[32]) {
   return with_asset(runtime, [&](Backend& backend) -> absl::Status {
     if (digest == nullptr) return absl::InvalidArgumentError("the digest is null");
@@ -250,15 +263,19 @@ lightloom_result lightloom_set_environment(lightloom_runtime* runtime, const flo
 lightloom_result lightloom_set_update_options(lightloom_runtime* runtime, const lightloom_update_options* options) {
   if (runtime == nullptr) return LIGHTLOOM_ERROR_INVALID_ARGUMENT;
   return guarded(runtime->messages, [&]() -> absl::Status {
-    if (options == nullptr || options->struct_size < sizeof(lightloom_update_options)) {
+    if (options == nullptr || options->struct_size < offsetof(lightloom_update_options, fade)) {
       return absl::InvalidArgumentError("lightloom_update_options is null or its struct_size is wrong");
     }
-    lightloom_update_options o = *options;
-    if (!(o.epsilon >= 0) || !(o.epsilon_floor >= 0) || !(o.smoothing >= 0) || !(o.smoothing <= 1) ||
+    lightloom_update_options o{};
+    std::memcpy(&o, options, std::min<size_t>(options->struct_size, sizeof o));
+    const auto is_share = [](float v) { return v >= 0 && v <= 1; };
+    if (!(o.epsilon >= 0) || !(o.epsilon_floor >= 0) || !is_share(o.smoothing) || !is_share(o.fade) ||
         !std::isfinite(o.epsilon) || !std::isfinite(o.epsilon_floor)) {
-      return absl::InvalidArgumentError("epsilon and epsilon_floor must be at least 0, smoothing within [0, 1]");
+      return absl::InvalidArgumentError(
+          "epsilon and epsilon_floor must be at least 0, smoothing and fade within [0, 1]");
     }
     if (o.smoothing == 0) o.smoothing = 1;
+    if (o.fade == 0) o.fade = 1;
     return runtime->backend->set_options(o);
   });
 }

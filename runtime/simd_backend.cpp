@@ -12,92 +12,91 @@ namespace lightloom {
 absl::Status SimdBackend::load_manifest(std::span<const uint8_t> bytes) {
   unload();  // the old asset goes first: both may not fit
   LL_ASSIGN_OR_RETURN(const Manifest manifest, decode_manifest(bytes));
-  LL_ASSIGN_OR_RETURN(AssetIndex made, AssetIndex::create(manifest, memory_));
-  const AssetIndex& index = index_.emplace(std::move(made));
+  LL_ASSIGN_OR_RETURN(const auto index, AssetIndex::create_shared(manifest, memory_));
   SimdOptions options;
   options.threads = static_cast<int>(options_.threads);
   options.smoothing = options_.smoothing;
   options.memory = memory_;
-  auto runtime = std::make_unique<SimdRuntime>(index, options);
+  auto runtime = std::make_unique<SimdRuntime>(*index, options);
   if (options_.byte_budget != 0 && runtime->counts().bytes > options_.byte_budget) {
     return over_budget("the surface arrays alone take " + std::to_string(runtime->counts().bytes) +
                        " bytes, the budget is " + std::to_string(options_.byte_budget));
   }
-  keys_.assign(index.objects().size(), nullptr);
+  surfaces_.assign(index->objects().size(), false);
+  probes_.assign(index->probes().size(), std::nullopt);
+  cells_.assign(index->cells().size(), std::nullopt);
+  coarse_rays_ = coarse_rays(index->rays());
   runtime_ = std::move(runtime);
+  use(index);
   return absl::OkStatus();
 }
 
 void SimdBackend::unload() {
   runtime_ = nullptr;
-  keys_.clear();
-  index_.reset();
+  use(nullptr);
 }
 
-absl::Status SimdBackend::load_chunk(const Digest& digest, std::span<const uint8_t> bytes) {
-  LL_ASSIGN_OR_RETURN(const AssetIndex::Target target, find_chunk(*index_, digest));
-  switch (target.kind) {
-    case AssetIndex::Kind::kSurface:
-      return load_surface(target.index, bytes);
-    case AssetIndex::Kind::kRelight:
-      return load_relight(target.index, bytes);
-    case AssetIndex::Kind::kCell:
-      return load_cell(target.index, bytes);
-  }
-  return absl::OkStatus();
-}
-
-absl::Status SimdBackend::unload_chunk(const Digest& digest) {
-  LL_ASSIGN_OR_RETURN(const AssetIndex::Target target, find_chunk(*index_, digest));
+bool SimdBackend::resident(const AssetIndex::Target& target, const Detail& detail) const {
   const std::lock_guard lock(mutex_);
   switch (target.kind) {
     case AssetIndex::Kind::kSurface:
-      keys_[target.index] = nullptr;
+      return surfaces_[target.index];
+    case AssetIndex::Kind::kRelight:
+      return probes_[target.index] && probes_[target.index]->all_rays == detail.all_rays;
+    case AssetIndex::Kind::kCell:
+      break;
+  }
+  return cells_[target.index] && cells_[target.index]->max_rank == detail.max_rank;
+}
+
+void SimdBackend::unload_target(const AssetIndex::Target& target) {
+  const std::lock_guard lock(mutex_);
+  switch (target.kind) {
+    case AssetIndex::Kind::kSurface:
+      surfaces_[target.index] = false;
       break;
     case AssetIndex::Kind::kRelight:
       runtime_->unload_probe(target.index);
+      probes_[target.index].reset();
       break;
     case AssetIndex::Kind::kCell:
       runtime_->unload_cell(target.index);
+      cells_[target.index].reset();
       break;
   }
-  return absl::OkStatus();
 }
 
-absl::Status SimdBackend::load_surface(uint32_t object, std::span<const uint8_t> bytes) {
-  LL_ASSIGN_OR_RETURN(const SurfaceChunk chunk, index_->surface(object, bytes));
-  SurfaceKeys keys = keys_of_surface(chunk, memory_);
+absl::Status SimdBackend::load_surface(uint32_t object, const SurfaceChunk&) {
   const std::lock_guard lock(mutex_);
-  if (keys_[object] == nullptr) keys_[object] = std::move(keys);
+  surfaces_[object] = true;
   return absl::OkStatus();
 }
 
-absl::Status SimdBackend::load_relight(uint32_t probe, std::span<const uint8_t> bytes) {
-  LL_ASSIGN_OR_RETURN(const auto rays,
-                      resolve_relight(*index_, probe, bytes, [this](uint32_t o) { return keys_of(o); }));
+absl::Status SimdBackend::load_relight(uint32_t probe, std::span<const uint32_t> rays, const Detail& detail) {
+  std::vector<uint32_t> few;
+  if (!detail.all_rays) {
+    for (const uint32_t r : coarse_rays_) few.push_back(rays[r]);
+    rays = few;
+  }
   simd::PackedProbe packed = runtime_->pack_probe(rays);
   const std::lock_guard lock(mutex_);
-  LL_RETURN_IF_ERROR(check_budget(packed.bytes()));
+  LL_RETURN_IF_ERROR(check_budget(packed.bytes(), runtime_->probe_bytes(probe)));
   runtime_->load_probe(probe, std::move(packed));
+  probes_[probe] = detail;
   return absl::OkStatus();
 }
 
-absl::Status SimdBackend::load_cell(uint32_t cell, std::span<const uint8_t> bytes) {
-  LL_ASSIGN_OR_RETURN(const SourceCell source,
-                      resolve_cell(*index_, cell, bytes, [this](uint32_t o) { return keys_of(o); }));
+absl::Status SimdBackend::load_cell(uint32_t cell, const SourceCell& source, const Detail& detail) {
   simd::PackedCell packed = runtime_->pack_cell(source);
   const std::lock_guard lock(mutex_);
-  LL_RETURN_IF_ERROR(check_budget(packed.bytes()));
-  return runtime_->load_cell(cell, std::move(packed));
+  LL_RETURN_IF_ERROR(check_budget(packed.bytes(), runtime_->cell_bytes(cell)));
+  LL_RETURN_IF_ERROR(runtime_->load_cell(cell, std::move(packed)));
+  cells_[cell] = detail;
+  return absl::OkStatus();
 }
 
-SurfaceKeys SimdBackend::keys_of(uint32_t object) const {
-  const std::lock_guard lock(mutex_);
-  return keys_[object];
-}
-
-absl::Status SimdBackend::check_budget(uint64_t more) const {
-  const uint64_t bytes = runtime_->counts().bytes + more;
+absl::Status SimdBackend::check_budget(uint64_t more, uint64_t less) const {
+  const uint64_t bytes = runtime_->counts().bytes + more - less;
   if (options_.byte_budget == 0 || bytes <= options_.byte_budget) return absl::OkStatus();
   return over_budget("the chunk would take the asset to " + std::to_string(bytes) + " bytes, the budget is " +
                      std::to_string(options_.byte_budget) + "; unload something first");
@@ -116,8 +115,8 @@ void SimdBackend::set(SurfaceInput input, uint64_t first, std::span<const float>
 }
 
 absl::Status SimdBackend::set_options(const lightloom_update_options& options) {
-  if (options.smoothing < 1 && !options_.smoothing) {
-    return absl::InvalidArgumentError("smoothing below 1 needs LIGHTLOOM_CREATE_SMOOTHING");
+  if ((options.smoothing < 1 || options.fade < 1) && !options_.smoothing) {
+    return absl::InvalidArgumentError("smoothing and fade below 1 need LIGHTLOOM_CREATE_SMOOTHING");
   }
   const std::lock_guard lock(mutex_);
   update_options_ = options;
@@ -128,8 +127,8 @@ absl::Status SimdBackend::update(uint32_t frames) {
   SimdFrameOptions frame;
   {
     const std::lock_guard lock(mutex_);
-    frame = {update_options_.max_probes, update_options_.max_cells, update_options_.epsilon,
-             update_options_.epsilon_floor, update_options_.smoothing};
+    frame = {update_options_.max_probes,    update_options_.max_cells, update_options_.epsilon,
+             update_options_.epsilon_floor, update_options_.smoothing, update_options_.fade};
   }
   for (uint32_t f = 0; f < frames; ++f) runtime_->update(frame);
   return absl::OkStatus();
@@ -141,7 +140,7 @@ absl::Status SimdBackend::read_irradiance(std::span<float> rgb) {
 }
 
 lightloom_counts SimdBackend::counts() const {
-  lightloom_counts out = counts_of(*index_);
+  lightloom_counts out = counts_of(index());
   const SimdCounts c = runtime_->counts();
   out.resident_probes = c.resident_probes;
   out.resident_cells = c.resident_cells;
@@ -149,8 +148,7 @@ lightloom_counts SimdBackend::counts() const {
   out.gpu_bytes = c.bytes;
   out.byte_budget = options_.byte_budget;
   const std::lock_guard lock(mutex_);
-  out.resident_surfaces =
-      static_cast<uint32_t>(std::count_if(keys_.begin(), keys_.end(), [](const auto& k) { return k != nullptr; }));
+  out.resident_surfaces = static_cast<uint32_t>(std::count(surfaces_.begin(), surfaces_.end(), true));
   return out;
 }
 

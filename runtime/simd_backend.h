@@ -19,16 +19,12 @@ class SimdBackend final : public Backend {
     bool smoothing = false;
     uint64_t byte_budget = 0;  ///< 0: no limit
   };
-  SimdBackend(const Options& options, std::pmr::memory_resource* memory) : options_(options), memory_(memory) {
-    update_options_.smoothing = 1;
+  SimdBackend(const Options& options, std::pmr::memory_resource* memory) : Backend(memory), options_(options) {
+    update_options_.smoothing = update_options_.fade = 1;
   }
 
   absl::Status load_manifest(std::span<const uint8_t> manifest) override;
   void unload() override;
-  bool loaded() const override { return runtime_ != nullptr; }
-  const AssetIndex& index() const override { return *index_; }
-  absl::Status load_chunk(const Digest& digest, std::span<const uint8_t> bytes) override;
-  absl::Status unload_chunk(const Digest& digest) override;
   void set(SurfaceInput input, uint64_t first, std::span<const float> rgb) override;
   void set_environment(Vec3 radiance) override { runtime_->set_environment(radiance); }
   absl::Status set_options(const lightloom_update_options& options) override;
@@ -38,21 +34,24 @@ class SimdBackend final : public Backend {
   lightloom_counts counts() const override;
   lightloom_stats stats() const override;
 
+ protected:
+  bool resident(const AssetIndex::Target& target, const Detail& detail) const override;
+  absl::Status load_surface(uint32_t object, const SurfaceChunk& chunk) override;
+  absl::Status load_relight(uint32_t probe, std::span<const uint32_t> rays, const Detail& detail) override;
+  absl::Status load_cell(uint32_t cell, const SourceCell& source, const Detail& detail) override;
+  void unload_target(const AssetIndex::Target& target) override;
+
  private:
-  absl::Status load_surface(uint32_t object, std::span<const uint8_t> bytes);
-  absl::Status load_relight(uint32_t probe, std::span<const uint8_t> bytes);
-  absl::Status load_cell(uint32_t cell, std::span<const uint8_t> bytes);
-  SurfaceKeys keys_of(uint32_t object) const;
-  absl::Status check_budget(uint64_t more) const;
+  absl::Status check_budget(uint64_t more, uint64_t less) const;
 
   const Options options_;
-  std::pmr::memory_resource* memory_;
-  std::optional<AssetIndex> index_;
   std::unique_ptr<SimdRuntime> runtime_;
+  std::vector<uint32_t> coarse_rays_;
 
   mutable std::mutex mutex_;  ///< guards all below, and that the budget holds
   lightloom_update_options update_options_{};
-  std::vector<SurfaceKeys> keys_;  ///< per object; null: not resident
+  std::vector<bool> surfaces_;                         ///< per object: resident
+  std::vector<std::optional<Detail>> probes_, cells_;  ///< what is resident
 };
 
 }  // namespace lightloom

@@ -85,7 +85,7 @@ typedef struct lightloom_allocator {
 enum {
   LIGHTLOOM_CREATE_VALIDATION = 1u << 0,   /* core and synchronization validation; needs the Khronos layer. Slow. */
   LIGHTLOOM_CREATE_GPU_ASSISTED = 1u << 1, /* with VALIDATION: shaders' accesses are checked too. Very slow. */
-  LIGHTLOOM_CREATE_SMOOTHING = 1u << 2,    /* makes room for lightloom_update_options.smoothing < 1 */
+  LIGHTLOOM_CREATE_SMOOTHING = 1u << 2,    /* makes room for smoothing and fade < 1 (lightloom_update_options) */
   LIGHTLOOM_CREATE_CPU = 1u << 3 /* no device: the processor's vector units; only SMOOTHING may stand beside it */
 };
 
@@ -128,6 +128,22 @@ LIGHTLOOM_API lightloom_result lightloom_load_manifest(lightloom_runtime* runtim
  * frames in flight. */
 LIGHTLOOM_API lightloom_result lightloom_load_chunk(lightloom_runtime* runtime, const uint8_t digest[32],
                                                     const void* bytes, uint64_t size);
+
+/* How much of a chunk is kept. Less of it takes less memory and time, and gives a coarser light that has its energy. */
+typedef struct lightloom_detail {
+  uint32_t struct_size;
+  uint32_t flags;    /* LIGHTLOOM_DETAIL_* */
+  uint32_t max_rank; /* cells: coefficients per cluster at most, besides the uniform one */
+  uint32_t reserved; /* 0 */
+} lightloom_detail;
+
+enum { LIGHTLOOM_DETAIL_COARSE_RAYS = 1u << 0 /* relight sets: about 256 of their rays */ };
+
+/* As lightloom_load_chunk. If the chunk is resident in another detail, that one lights the level until the frame which
+ * has all of the new one (both take memory until then), and E goes to its new values by `fade`. */
+LIGHTLOOM_API lightloom_result lightloom_load_chunk_part(lightloom_runtime* runtime, const uint8_t digest[32],
+                                                         const void* bytes, uint64_t size,
+                                                         const lightloom_detail* detail);
 
 /* Its memory is used again once frames_in_flight more frames are recorded. Without its surface chunk an object
  * gets no light from the direct pass; cells and probes that name it go on. A chunk that is not resident is no
@@ -228,6 +244,8 @@ typedef struct lightloom_update_options {
   float epsilon_floor;   /* radiance below which a change is compared with epsilon * epsilon_floor instead */
   float smoothing;       /* E goes this share of the way to its new value each frame, (0, 1]; 0 means 1: at once */
   uint64_t upload_bytes; /* that a frame copies at most; 0: what the staging buffer holds */
+  float fade;            /* as smoothing, but only for what a chunk in another detail changes; 0 means 1: at once */
+  uint32_t reserved;     /* 0 */
 } lightloom_update_options;
 
 /* For the frames recorded from now on. */

@@ -36,6 +36,8 @@ LL_CONSTANT uint kSky = 0xfffffffeu;
 LL_CONSTANT uint kNoElement = 0xffffffffu;
 /// Image texels that take a neighbour's element.
 LL_CONSTANT uint kDilated = 0x80000000u;
+/// The cell has another model than before: its E goes to the new values little by little.
+LL_CONSTANT uint kFades = 0x80000000u;
 /// Slots without probe.
 LL_CONSTANT uint kNoProbe = 0xffffffffu;
 
@@ -48,8 +50,8 @@ struct Groups {
 struct Control {
   uint probe_cursor, cell_cursor, unused0, unused1;
   uint changed_tiles, updated_probes, waiting_probes, updated_cells;
-  uint waiting_cells, project_quads, receive_quads, unused2;
-  uint limit[3];  // greatest |radiance| of anything, float bits
+  uint waiting_cells, project_quads, receive_quads, coarse_probes;  // of the updated ones: with few rays
+  uint limit[3];                                                    // greatest |radiance| of anything, float bits
   uint unused3;
   Groups mark, mark_cells, image;
   uint unused4[3];
@@ -79,7 +81,9 @@ struct Slot {
 };
 /// A cell to be updated. Its workgroups are those from first_job, first_group on up to the next one's.
 struct ActiveCell {
-  uint base, octets, first_job, first_group;
+  uint base;
+  uint octets;  // and kFades
+  uint first_job, first_group;
 };
 
 /// At the start of a cell's block. Offsets from there, in words or quads (uvec4).
@@ -144,6 +148,7 @@ struct MarkPush {
 };
 struct SelectProbesPush {
   uint slots, pool_slots, max_probes, frame, cell_groups, max_groups;
+  uint coarse_pool;  // from this pool on relight sets have few rays
 };
 struct RelightPush {
   float sky_r, sky_g, sky_b;
@@ -164,9 +169,12 @@ struct ProjectPush {
 };
 struct ReceivePush {
   uint pool;
+  uint target;  // where the targets begin in the buffer of E, in floats; 0: E takes its value at once
+  uint keep;    // 1: only targets are written
 };
 struct SettlePush {
   uint values;  // 3·S
+  uint target;  // as ReceivePush
   float alpha;
   float arrived, black;  // runtime/rounding.h
 };

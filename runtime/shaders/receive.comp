@@ -14,7 +14,7 @@ layout(std430, binding = 2) readonly buffer Quads { uvec4 quads[]; };
 layout(std430, binding = 3) readonly buffer Coefficients { vec4 coefficients[]; };
 layout(std430, binding = 4) readonly buffer Active { ActiveCell active_cells[]; };
 layout(std430, binding = 5) readonly buffer Shared { Control control; };
-layout(std430, binding = 6) writeonly buffer Irradiance { float irradiance[]; };
+layout(std430, binding = 6) buffer Irradiance { float irradiance[]; };  // E, then its targets
 
 const float kPi = 3.14159265358979324;
 
@@ -29,6 +29,18 @@ uint find_cell(uint group) {
   return lo;
 }
 
+/// With targets, the distance of E from its own stays as it is, and settle.comp makes it smaller: changes of light show
+/// at once, those of the model do not.
+void store(uint at, float value, float limit, bool stays) {
+  if (push.target != 0u) {
+    const float shown = irradiance[at], old = irradiance[push.target + at];
+    irradiance[push.target + at] = value;
+    if (stays) return;
+    if (shown != old) value = clamp(shown + (value - old), -limit, limit);
+  }
+  irradiance[at] = value;
+}
+
 void main() {
   const uint group = group_index();
   if (group >= control.groups[push.pool]) return;
@@ -41,7 +53,8 @@ void main() {
   const uint octet_at = word + words[word + 4], element_at = word + words[word + 5];
   const uint uniform_at = quad + words[word + 6], coefficient_at = quad + words[word + 7];
   const uint begin = kReceiveOctets * (group - active_cells[cell].first_group);
-  const uint end = min(begin + kReceiveOctets, active_cells[cell].octets);
+  const uint end = min(begin + kReceiveOctets, active_cells[cell].octets & ~kFades);
+  const bool stays = push.keep != 0u || (active_cells[cell].octets & kFades) != 0u;
   for (uint o = begin + gl_LocalInvocationIndex; o < end; o += kGroup) {
     const Cluster cluster = clusters[cluster_at + words[octet_at + 2 * o]];
     const uint coefficient = coefficient_at + cluster.first_coefficient;
@@ -65,9 +78,7 @@ void main() {
       const uint element = words[element_at + kOctet * o + n];
       if (element != kNoElement) {
         const vec3 bounded = clamp(vec3(r[n / 4][n % 4], g[n / 4][n % 4], b[n / 4][n % 4]), -limit, limit);
-        irradiance[3 * element] = bounded.r;
-        irradiance[3 * element + 1] = bounded.g;
-        irradiance[3 * element + 2] = bounded.b;
+        for (uint c = 0; c < 3; ++c) store(3 * element + c, bounded[c], limit[c], stays);
       }
     }
   }

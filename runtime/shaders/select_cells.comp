@@ -41,7 +41,9 @@ void choose(uint first, uint last) {
   }
   const uint room = push.max_cells - taken;
   if (is_dirty && before < room) {
-    cell_dirty[c] = 2u + cells[c].pool;
+    // Computed before, by another model of the cell or of a probe.
+    const bool fades = seen[c] != 0u && seen[c] != cells[c].live;
+    cell_dirty[c] = (2u + cells[c].pool) | (fades ? kFades : 0u);
     seen[c] = cells[c].live;
     atomicAdd(entries_of[cells[c].pool], 1u);
     atomicAdd(project_quads, cells[c].project_quads);
@@ -60,7 +62,7 @@ void choose(uint first, uint last) {
 void append(uint first) {
   const uint local = gl_LocalInvocationIndex;
   const uint c = first + local;
-  const uint pool = c < push.cells && cell_dirty[c] >= 2u ? cell_dirty[c] - 2u : kNoPool;
+  const uint pool = c < push.cells && cell_dirty[c] >= 2u ? (cell_dirty[c] & ~kFades) - 2u : kNoPool;
   pools[local] = pool;
   jobs[local] = pool == kNoPool ? 0u : cells[c].jobs;
   groups[local] = pool == kNoPool ? 0u : (cells[c].octets + kReceiveOctets - 1u) / kReceiveOctets;
@@ -75,7 +77,7 @@ void append(uint first) {
     }
     ActiveCell a;
     a.base = cells[c].base;
-    a.octets = cells[c].octets;
+    a.octets = cells[c].octets | (cell_dirty[c] & kFades);
     a.first_job = first_job;
     a.first_group = first_group;
     active_cells[first_of[pool] + entry] = a;

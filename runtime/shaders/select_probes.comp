@@ -73,6 +73,9 @@ void main() {
     control.relight[p] = spread((in_pool[p] + kRelightProbes - 1u) / kRelightProbes, push.max_groups);
   }
   if (local == 0u) {
+    uint coarse = 0u;
+    for (uint p = push.coarse_pool; p < kMaxPools; ++p) coarse += in_pool[p];
+    control.coarse_probes = coarse;
     control.updated_probes = taken;
     control.waiting_probes = found - taken;
     control.probe_cursor = next_cursor;

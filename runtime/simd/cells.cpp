@@ -29,7 +29,9 @@ Cells::Cells(std::pmr::memory_resource* memory, const AssetIndex& index)
       packed_(index.cells().size(), memory),
       missing_probes_(memory, index.cells().size()),
       received_(memory, (size_t{index.surface_elements()} + 63) / 64),
-      turns_(memory, static_cast<uint32_t>(index.cells().size())) {
+      turns_(memory, static_cast<uint32_t>(index.cells().size())),
+      lit_(memory, index.cells().size()),
+      fades_(memory, index.cells().size()) {
   for (uint32_t c = 0; c < index.cells().size(); ++c) missing_probes_[c] = index.cells()[c].probes;
 }
 
@@ -59,18 +61,21 @@ void Cells::release(const PackedCell& cell) {
 }
 
 absl::Status Cells::load(uint32_t cell, PackedCell packed) {
-  LL_CHECK(!resident(cell));
+  const bool replaces = resident(cell);
+  if (replaces) release(packed_[cell]);
   if (!claim(packed)) {
+    if (replaces) LL_CHECK(claim(packed_[cell]));
     return absl::DataLossError("cell " + std::to_string(cell) +
                                " is corrupt: a receiver occurs twice; bake again or fetch it again");
   }
-  bytes_ += packed.bytes();
-  packed_[cell] = std::move(packed);
-  ++resident_;
-  if (active(cell)) {
-    ++active_;
-    turns_.add(cell);
+  if (!replaces) {
+    ++resident_;
+    active_ += missing_probes_[cell] == 0;
   }
+  bytes_ += packed.bytes() - packed_[cell].bytes();
+  packed_[cell] = std::move(packed);
+  fades_[cell] = lit_[cell];
+  if (active(cell)) turns_.add(cell);
   return absl::OkStatus();
 }
 
@@ -101,6 +106,13 @@ void Cells::probe_unloaded(uint32_t probe) {
   }
 }
 
+void Cells::probe_replaced(uint32_t probe) {
+  for (const uint32_t c : index_.cells_of(probe)) {
+    fades_[c] = lit_[c];
+    if (active(c)) turns_.add(c);
+  }
+}
+
 void Cells::lambda_changed(uint32_t probe) {
   for (const uint32_t c : index_.cells_of(probe)) {
     if (active(c)) turns_.add(c);
@@ -108,6 +120,8 @@ void Cells::lambda_changed(uint32_t probe) {
 }
 
 void Cells::reset() {
+  lit_.fill(0);
+  fades_.fill(0);
   for (uint32_t c = 0; c < packed_.size(); ++c) {
     if (active(c)) turns_.add(c);
   }
@@ -122,19 +136,23 @@ void Cells::project(const Kernels& kernels, WorkerPool* pool, const float* lambd
   });
 }
 
-void Cells::receive(const Kernels& kernels, WorkerPool* pool, Surface* surface, bool at_once) const {
+void Cells::receive(const Kernels& kernels, WorkerPool* pool, Surface* surface, bool stay, bool may_fade) {
   pool->run(chosen_count(), [&](uint32_t i) {
     alignas(64) float block[3 * kReceiveBlock];
-    const PackedCell& cell = packed_[chosen_[i]];
+    const uint32_t index = chosen_[i];
+    const PackedCell& cell = packed_[index];
+    const bool stays = stay || (may_fade && fades_[index] != 0);
     for (const PackedCluster& c : cell.clusters) {
       const ClusterView view = cell.view(c);
       for (uint32_t first = 0; first < c.receivers; first += kReceiveBlock) {
         kernels.receive(view, cell.coefficients.data() + c.coefficients, first,
                         std::min(kReceiveBlock, c.padded - first), block);
         surface->receive(cell.elements.data() + c.first + first, std::min(kReceiveBlock, c.receivers - first), block,
-                         at_once);
+                         stays);
       }
     }
+    lit_[index] = 1;
+    fades_[index] = 0;
   });
 }
 

@@ -18,13 +18,17 @@ class Cells {
   uint32_t active_count() const { return active_; }
   uint32_t waiting() const { return turns_.waiting(); }
 
-  /// DataLoss if a receiver is that of another resident cell, or twice in this one. REQUIRES: not resident.
+  /// Replaces the cell if it is resident. DataLoss if a receiver is that of another resident cell, or twice in this one;
+  /// then nothing has changed.
   absl::Status load(uint32_t cell, PackedCell packed);
+  uint64_t bytes_of(uint32_t cell) const { return packed_[cell].bytes(); }
   /// The E of its receivers stays what it was.
   void unload(uint32_t cell);
   /// A cell is active while it is resident with all its probes.
   void probe_loaded(uint32_t probe);
   void probe_unloaded(uint32_t probe);
+  /// The probe was resident and now has another relight set.
+  void probe_replaced(uint32_t probe);
   void lambda_changed(uint32_t probe);
   /// Every active cell waits.
   void reset();
@@ -33,7 +37,8 @@ class Cells {
   void choose(uint32_t most) { chosen_ = turns_.take(most); }
   uint32_t chosen_count() const { return static_cast<uint32_t>(chosen_.size()); }
   void project(const Kernels& kernels, WorkerPool* pool, const float* lambda, uint32_t lambda_stride);
-  void receive(const Kernels& kernels, WorkerPool* pool, Surface* surface, bool at_once) const;
+  /// `stay`: as Surface::receive; of a cell with another model than before E stays in any case, if `may_fade`.
+  void receive(const Kernels& kernels, WorkerPool* pool, Surface* surface, bool stay, bool may_fade);
   /// Bytes of the matrices of the chosen cells.
   uint64_t projection_bytes() const;
   uint64_t reconstruction_bytes() const;
@@ -52,6 +57,8 @@ class Cells {
   Array<uint64_t> received_;        ///< bit per surface element: a receiver of a resident cell
   Turns turns_;
   std::span<const uint32_t> chosen_;
+  Array<uint8_t> lit_;    ///< per cell: E shows some model of it
+  Array<uint8_t> fades_;  ///< per cell: but not yet the one that is resident
   uint32_t resident_ = 0, active_ = 0;
   uint64_t bytes_ = 0;
 };

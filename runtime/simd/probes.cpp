@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cstring>
+#include <iterator>
 
 #include "core/base/check.h"
 #include "core/base/sh.h"
+#include "runtime/detail.h"
 
 namespace lightloom::simd {
 namespace {
@@ -18,15 +20,15 @@ uint32_t lambda_stride_of(int order) {
   return (static_cast<uint32_t>(sh_count(order)) + kLambdaAlign - 1) / kLambdaAlign * kLambdaAlign;
 }
 
-/// RelightJob::sh.
-Array<float> sh_table(std::pmr::memory_resource* memory, int order, uint32_t rays) {
+/// RelightJob::sh of the chosen of `rays` directions.
+Array<float> sh_table(std::pmr::memory_resource* memory, int order, uint32_t rays, std::span<const uint32_t> chosen) {
   const uint32_t J = static_cast<uint32_t>(sh_count(order));
-  Array<float> table(memory, size_t{lambda_stride_of(order)} * rays);
+  Array<float> table(memory, lambda_stride_of(order) * chosen.size());
   float y[kMaxShCount];
-  for (uint32_t r = 0; r < rays; ++r) {
-    sh_evaluate(order, sphere_direction(r, rays), y);
+  for (size_t r = 0; r < chosen.size(); ++r) {
+    sh_evaluate(order, sphere_direction(chosen[r], rays), y);
     for (uint32_t j = 0; j < J; ++j) {
-      table[(size_t{j} / kLambdaAlign * rays + r) * kLambdaAlign + j % kLambdaAlign] = y[j];
+      table[(size_t{j} / kLambdaAlign * chosen.size() + r) * kLambdaAlign + j % kLambdaAlign] = y[j];
     }
   }
   return table;
@@ -42,22 +44,28 @@ bool intersect(const Array<uint64_t>& a, const Array<uint64_t>& b) {
 }  // namespace
 
 Probes::Probes(std::pmr::memory_resource* memory, const AssetIndex& index)
-    : rays_(index.rays()),
-      lambda_stride_(lambda_stride_of(static_cast<int>(index.order()))),
+    : lambda_stride_(lambda_stride_of(static_cast<int>(index.order()))),
       packed_(index.probes().size(), memory),
-      sh_(sh_table(memory, static_cast<int>(index.order()), index.probes().empty() ? 0 : rays_)),
       lambda_(memory, index.probes().size() * 3 * lambda_stride_),
+      grouped_(memory, index.probes().size()),
       flags_(memory, index.probes().size()),
       turns_(memory, static_cast<uint32_t>(index.probes().size())) {
-  LL_CHECK(rays_ > 0 && index.surface_elements() <= 1u << 31);
-  bytes_ = sh_.bytes() + lambda_.bytes();
+  const uint32_t rays = index.rays();
+  LL_CHECK(rays > 0 && index.surface_elements() <= 1u << 31);
+  const auto make = [&](const std::vector<uint32_t>& chosen) {
+    const std::span<const uint32_t> used = index.probes().empty() ? std::span<const uint32_t>() : chosen;
+    return Rays{static_cast<uint32_t>(chosen.size()), sh_table(memory, static_cast<int>(index.order()), rays, used)};
+  };
+  all_ = make(every_ray(rays));
+  coarse_ = make(coarse_rays(rays));
+  bytes_ = all_.sh.bytes() + coarse_.sh.bytes() + lambda_.bytes();
 }
 
 void Probes::load(uint32_t probe, PackedProbe packed) {
-  LL_CHECK(!resident(probe) && packed.elements.size() == rays_);
-  bytes_ += packed.bytes();
+  LL_CHECK(packed.elements.size() == all_.count || packed.elements.size() == coarse_.count);
+  resident_ += !resident(probe);
+  bytes_ += packed.bytes() - packed_[probe].bytes();
   packed_[probe] = std::move(packed);
-  ++resident_;
   turns_.add(probe);
 }
 
@@ -93,25 +101,35 @@ void Probes::select(const Surface& surface, WorkerPool* pool) {
 std::span<const uint32_t> Probes::relight(const Kernels& kernels, WorkerPool* pool, const float* radiosity,
                                           uint32_t most) {
   const std::span<const uint32_t> chosen = turns_.take(most);
-  const uint32_t groups = (static_cast<uint32_t>(chosen.size()) + kRelightProbes - 1) / kRelightProbes;
-  pool->run(groups, [&](uint32_t group) {
-    const size_t first = size_t{group} * kRelightProbes;
-    relight_group(kernels, radiosity, chosen.subspan(first, std::min<size_t>(kRelightProbes, chosen.size() - first)));
+  // Probes of a group have as many rays.
+  const auto last = std::partition_copy(chosen.begin(), chosen.end(), grouped_.data(),
+                                        std::make_reverse_iterator(grouped_.data() + chosen.size()),
+                                        [this](uint32_t p) { return &rays_of(p) == &all_; });
+  const uint32_t with_all = static_cast<uint32_t>(last.first - grouped_.data());
+  const uint32_t with_few = static_cast<uint32_t>(chosen.size()) - with_all;
+  relit_rays_ = uint64_t{with_all} * all_.count + uint64_t{with_few} * coarse_.count;
+  const auto groups_of = [](uint32_t probes) { return (probes + kRelightProbes - 1) / kRelightProbes; };
+  pool->run(groups_of(with_all) + groups_of(with_few), [&](uint32_t group) {
+    const bool few = group >= groups_of(with_all);
+    const uint32_t first = few ? with_all + (group - groups_of(with_all)) * kRelightProbes : group * kRelightProbes;
+    const uint32_t end = few ? static_cast<uint32_t>(chosen.size()) : with_all;
+    relight_group(kernels, radiosity, {grouped_.data() + first, std::min(kRelightProbes, end - first)});
   });
   return chosen;
 }
 
 void Probes::relight_group(const Kernels& kernels, const float* radiosity, std::span<const uint32_t> probes) {
   alignas(64) float fresh[kRelightColumns * (kMaxShCount + kLambdaAlign)];
+  const Rays& rays = rays_of(probes[0]);
   RelightJob job;
-  job.sh = sh_.data();
+  job.sh = rays.sh.data();
   job.radiosity = radiosity;
   for (uint32_t i = 0; i < kRelightProbes; ++i) {
     job.elements[i] = i < probes.size() ? packed_[probes[i]].elements.data() : nullptr;
   }
-  job.rays = rays_;
+  job.rays = rays.count;
   job.lambda_stride = lambda_stride_;
-  job.scale = static_cast<float>(4 * 3.14159265358979323846 / rays_);
+  job.scale = static_cast<float>(4 * 3.14159265358979323846 / rays.count);
   kernels.relight(job, fresh);
 
   const size_t floats = size_t{3} * lambda_stride_;

@@ -14,9 +14,10 @@ class Probes {
   Probes(std::pmr::memory_resource* memory, const AssetIndex& index);
 
   bool resident(uint32_t probe) const { return packed_[probe].elements.size() != 0; }
+  uint64_t bytes_of(uint32_t probe) const { return packed_[probe].bytes(); }
   uint32_t resident_count() const { return resident_; }
   uint32_t waiting() const { return turns_.waiting(); }
-  /// REQUIRES: not resident; `packed` is pack_probe's, for the manifest's number of rays.
+  /// Replaces the probe if it is resident. REQUIRES: `packed` has the manifest's rays, or the coarse_rays() of them.
   void load(uint32_t probe, PackedProbe packed);
   /// Its λ stays what it was.
   void unload(uint32_t probe);
@@ -30,18 +31,28 @@ class Probes {
   std::span<const uint32_t> relight(const Kernels& kernels, WorkerPool* pool, const float* radiosity, uint32_t most);
   bool changed(uint32_t probe) const { return flags_[probe] != 0; }
 
-  uint32_t rays() const { return rays_; }
+  /// Rays of the probes of the last relight().
+  uint64_t relit_rays() const { return relit_rays_; }
   /// [probe][colour][lambda_stride]
   const float* lambda() const { return lambda_.data(); }
   uint32_t lambda_stride() const { return lambda_stride_; }
   uint64_t bytes() const { return bytes_; }
 
  private:
+  /// Relight sets of so many rays, and Y of their directions (RelightJob::sh).
+  struct Rays {
+    uint32_t count = 0;
+    Array<float> sh;
+  };
+  const Rays& rays_of(uint32_t probe) const { return packed_[probe].elements.size() == all_.count ? all_ : coarse_; }
   void relight_group(const Kernels& kernels, const float* radiosity, std::span<const uint32_t> probes);
 
-  uint32_t rays_, lambda_stride_;
+  uint32_t lambda_stride_;
+  Rays all_, coarse_;
+  uint64_t relit_rays_ = 0;
   std::pmr::vector<PackedProbe> packed_;
-  Array<float> sh_, lambda_;
+  Array<float> lambda_;
+  Array<uint32_t> grouped_;  ///< of relight()
   /// Per probe: sees a change, then λ has changed. Bytes, so that threads may write neighbours.
   Array<uint8_t> flags_;
   Turns turns_;

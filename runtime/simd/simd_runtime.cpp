@@ -27,7 +27,7 @@ SimdRuntime::SimdRuntime(const AssetIndex& index, const SimdOptions& options)
 
 absl::Status SimdRuntime::load_cell(uint32_t cell, simd::PackedCell packed) {
   const std::lock_guard lock(mutex_);
-  return cells_.resident(cell) ? absl::OkStatus() : cells_.load(cell, std::move(packed));
+  return cells_.load(cell, std::move(packed));
 }
 
 void SimdRuntime::unload_cell(uint32_t cell) {
@@ -37,9 +37,13 @@ void SimdRuntime::unload_cell(uint32_t cell) {
 
 void SimdRuntime::load_probe(uint32_t probe, simd::PackedProbe packed) {
   const std::lock_guard lock(mutex_);
-  if (probes_.resident(probe)) return;
+  const bool replaces = probes_.resident(probe);
   probes_.load(probe, std::move(packed));
-  cells_.probe_loaded(probe);
+  if (replaces) {
+    cells_.probe_replaced(probe);
+  } else {
+    cells_.probe_loaded(probe);
+  }
 }
 
 void SimdRuntime::unload_probe(uint32_t probe) {
@@ -62,6 +66,7 @@ void SimdRuntime::set_environment(Vec3 radiance) {
 
 SimdStats SimdRuntime::update(const SimdFrameOptions& options) {
   LL_CHECK(options.smoothing > 0 && options.smoothing <= 1 && (smoothing_ || options.smoothing == 1));
+  LL_CHECK(options.fade > 0 && options.fade <= 1 && (smoothing_ || options.fade == 1));
   const std::lock_guard lock(mutex_);
   SimdStats& s = stats_;
   ++s.frames;
@@ -86,7 +91,7 @@ SimdStats SimdRuntime::update(const SimdFrameOptions& options) {
   const std::span<const uint32_t> relit =
       probes_.relight(*kernels_, &pool_, surface_.radiosity_values(), options.max_probes);
   s.updated_probes = static_cast<uint32_t>(relit.size());
-  s.relight_bytes = uint64_t{s.updated_probes} * probes_.rays() * sizeof(uint32_t);
+  s.relight_bytes = probes_.relit_rays() * sizeof(uint32_t);
   lap(&s.relight_ms);
 
   for (const uint32_t p : relit) {
@@ -101,9 +106,8 @@ SimdStats SimdRuntime::update(const SimdFrameOptions& options) {
   cells_.project(*kernels_, &pool_, probes_.lambda(), probes_.lambda_stride());
   lap(&s.project_ms);
 
-  const bool at_once = options.smoothing == 1;
-  cells_.receive(*kernels_, &pool_, &surface_, at_once);
-  if (smoothing_) surface_.smooth(&pool_, options.smoothing);
+  cells_.receive(*kernels_, &pool_, &surface_, options.smoothing < 1, options.fade < 1);
+  if (smoothing_) surface_.smooth(&pool_, options.smoothing < 1 ? options.smoothing : options.fade);
   lap(&s.receive_ms);
 
   s.waiting_probes = probes_.waiting();
@@ -128,6 +132,16 @@ void SimdRuntime::read_irradiance(std::span<float> rgb) const {
 SimdStats SimdRuntime::stats() const {
   const std::lock_guard lock(mutex_);
   return stats_;
+}
+
+uint64_t SimdRuntime::cell_bytes(uint32_t cell) const {
+  const std::lock_guard lock(mutex_);
+  return cells_.bytes_of(cell);
+}
+
+uint64_t SimdRuntime::probe_bytes(uint32_t probe) const {
+  const std::lock_guard lock(mutex_);
+  return probes_.bytes_of(probe);
 }
 
 SimdCounts SimdRuntime::counts() const {

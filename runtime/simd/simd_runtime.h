@@ -14,7 +14,7 @@ namespace lightloom {
 
 struct SimdOptions {
   int threads = 0;                              ///< 0: one per hardware thread
-  bool smoothing = false;                       ///< makes room for SimdFrameOptions::smoothing < 1
+  bool smoothing = false;                       ///< makes room for SimdFrameOptions::smoothing, fade < 1
   std::pmr::memory_resource* memory = nullptr;  ///< all that stays allocated; null: new and delete. Must outlive it.
   const simd::Kernels* kernels = nullptr;       ///< null: the processor's best
   double (*milliseconds)() = nullptr;           ///< for SimdStats; null: a steady clock
@@ -28,6 +28,7 @@ struct SimdFrameOptions {
   /// with epsilon · epsilon_floor instead. Changes below kRounding (runtime/rounding.h) never count.
   float epsilon = 0, epsilon_floor = 0;
   float smoothing = 1;  ///< E goes this share of the way to its new value, (0, 1]
+  float fade = 1;       ///< as smoothing, but only for what a cell or probe that was replaced changes
 };
 
 struct SimdStats {
@@ -57,13 +58,14 @@ class SimdRuntime {
   /// Nothing is resident, all inputs and E are 0. Keeps a reference to the index.
   SimdRuntime(const AssetIndex& index, const SimdOptions& options);
 
-  /// REQUIRES: the cell and the rays are AssetSource's, of the same manifest.
+  /// REQUIRES: the cell and the rays are AssetSource's, of the same manifest; or what limit_rank() and coarse_rays() left
+  /// of them.
   simd::PackedCell pack_cell(const SourceCell& cell) const { return simd::pack_cell(cell, memory_); }
   simd::PackedProbe pack_probe(std::span<const uint32_t> rays) const {
     return simd::pack_probe(rays, surface_.elements(), memory_);
   }
 
-  /// Indices into the manifest. What is resident already is left alone. A cell takes part once all its probes are
+  /// Indices into the manifest. What is resident already is replaced. A cell takes part once all its probes are
   /// resident; until then, and after it is unloaded, its E stays what it was. DataLoss: two resident receivers are the
   /// same surface element.
   absl::Status load_cell(uint32_t cell, simd::PackedCell packed);
@@ -87,6 +89,9 @@ class SimdRuntime {
 
   SimdStats stats() const;
   SimdCounts counts() const;
+  /// Of what is resident; 0: it is not.
+  uint64_t cell_bytes(uint32_t cell) const;
+  uint64_t probe_bytes(uint32_t probe) const;
   const char* kernels() const { return kernels_->name; }
 
  private:

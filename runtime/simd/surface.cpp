@@ -4,7 +4,9 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <utility>
 
+#include "core/base/check.h"
 #include "core/base/sh.h"
 #include "runtime/rounding.h"
 
@@ -119,22 +121,32 @@ void Surface::find_limit() {
   }
 }
 
-void Surface::receive(const uint32_t* elements, uint32_t count, const float* block, bool at_once) {
-  float* const shown = irradiance_.data();
-  Array<uint8_t>& tiles = at_once ? dirty_ : moving_;
-  bool any = false;
+void Surface::receive(const uint32_t* elements, uint32_t count, const float* block, bool stays) {
+  LL_CHECK(smoothing_ || !stays);
+  bool any_shown = false, any_left = false;
   for (uint32_t i = 0; i < count; ++i) {
-    const size_t at = size_t{3} * elements[i];
-    const float r = std::clamp(block[i], -limit_[0], limit_[0]);
-    const float g = std::clamp(block[kReceiveBlock + i], -limit_[1], limit_[1]);
-    const float b = std::clamp(block[2 * kReceiveBlock + i], -limit_[2], limit_[2]);
-    const bool differs = (shown[at] != r) | (shown[at + 1] != g) | (shown[at + 2] != b);
-    if (smoothing_) target_[at] = r, target_[at + 1] = g, target_[at + 2] = b;
-    if (at_once) shown[at] = r, shown[at + 1] = g, shown[at + 2] = b;
-    if (differs) std::atomic_ref(tiles[elements[i] / kTile]).store(1, std::memory_order_relaxed);
-    any |= differs;
+    bool shown = false, left = false;
+    for (uint32_t c = 0; c < 3; ++c) {
+      float& e = irradiance_[size_t{3} * elements[i] + c];
+      const float value = std::clamp(block[c * kReceiveBlock + i], -limit_[c], limit_[c]);
+      float next = value;
+      if (smoothing_) {
+        const float old = std::exchange(target_[size_t{3} * elements[i] + c], value);
+        if (stays) next = e;
+        if (!stays && e != old) next = std::clamp(e + (value - old), -limit_[c], limit_[c]);
+      }
+      shown |= e != next;
+      left |= next != value;
+      e = next;
+    }
+    const uint32_t tile = elements[i] / kTile;
+    if (shown) std::atomic_ref(dirty_[tile]).store(1, std::memory_order_relaxed);
+    if (left) std::atomic_ref(moving_[tile]).store(1, std::memory_order_relaxed);
+    any_shown |= shown;
+    any_left |= left;
   }
-  if (any) (at_once ? any_dirty_ : any_moving_).store(true, std::memory_order_relaxed);
+  if (any_shown) any_dirty_.store(true, std::memory_order_relaxed);
+  if (any_left) any_moving_.store(true, std::memory_order_relaxed);
 }
 
 void Surface::smooth(WorkerPool* pool, float share) {

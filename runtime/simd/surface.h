@@ -39,10 +39,10 @@ class Surface {
   const float* radiosity_values() const { return radiosity_.data(); }
 
   /// The new E of elements[0..count); block[colour·kReceiveBlock + i]. No |E| becomes more than π times the greatest
-  /// radiance there is, so that feedback stays bounded whatever the asset says. `at_once`: E shows it; otherwise smooth() will
-  /// bring it there. Threads may write different elements at the same time.
-  void receive(const uint32_t* elements, uint32_t count, const float* block, bool at_once);
-  /// E goes `share` of the way to its new value wherever it is not there yet. REQUIRES: `smoothing` was asked for.
+  /// radiance there is, so that feedback stays bounded whatever the asset says. `stays`: E is left to smooth(); otherwise it
+  /// moves by as much as its goal does. Threads may write different elements at the same time.
+  void receive(const uint32_t* elements, uint32_t count, const float* block, bool stays);
+  /// E goes `share` of the way to its goal wherever it is not there yet. REQUIRES: `smoothing` was asked for.
   void smooth(WorkerPool* pool, float share);
 
   /// S × 3 floats.

@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <utility>
 
 #include "runtime/boundary.h"
 #include "runtime/resident.h"
+#include "runtime/rounding.h"
 
 namespace lightloom {
 namespace {
@@ -19,37 +21,23 @@ void append(std::pmr::vector<uint8_t>* to, const T* values, size_t count) {
 
 }  // namespace
 
-absl::Status VulkanAsset::load_chunk(const Digest& digest, std::span<const uint8_t> bytes) {
-  LL_ASSIGN_OR_RETURN(const AssetIndex::Target target, find_chunk(index_, digest));
-  {
-    const std::lock_guard lock(mutex_);
-    const bool resident = target.kind == AssetIndex::Kind::kSurface   ? surfaces_[target.index].keys != nullptr
-                          : target.kind == AssetIndex::Kind::kRelight ? probes_[target.index].resident
-                                                                      : cells_[target.index].resident;
-    if (resident) return absl::OkStatus();
-  }
-  const auto keys = [this](uint32_t object) {
-    const std::lock_guard lock(mutex_);
-    return surfaces_[object].keys;
-  };
+bool VulkanAsset::resident(const AssetIndex::Target& target, const Detail& detail) const {
+  const std::lock_guard lock(mutex_);
   switch (target.kind) {
-    case AssetIndex::Kind::kSurface: {
-      LL_ASSIGN_OR_RETURN(const SurfaceChunk chunk, index_.surface(target.index, bytes));
-      return load_surface(target.index, chunk);
-    }
+    case AssetIndex::Kind::kSurface:
+      return surfaces_[target.index];
     case AssetIndex::Kind::kRelight: {
-      LL_ASSIGN_OR_RETURN(const auto rays, resolve_relight(index_, target.index, bytes, keys));
-      return load_relight(target.index, rays);
+      const LitProbe* const newest = probes_[target.index].newest();
+      return newest != nullptr && newest->detail.all_rays == detail.all_rays;
     }
     case AssetIndex::Kind::kCell:
       break;
   }
-  LL_ASSIGN_OR_RETURN(const SourceCell source, resolve_cell(index_, target.index, bytes, keys));
-  return load_cell(target.index, source);
+  const LitCell* const newest = cells_[target.index].newest();
+  return newest != nullptr && newest->detail.max_rank == detail.max_rank;
 }
 
-absl::Status VulkanAsset::unload_chunk(const Digest& digest) {
-  LL_ASSIGN_OR_RETURN(const AssetIndex::Target target, find_chunk(index_, digest));
+void VulkanAsset::unload(const AssetIndex::Target& target) {
   const std::lock_guard lock(mutex_);
   switch (target.kind) {
     case AssetIndex::Kind::kSurface:
@@ -63,7 +51,6 @@ absl::Status VulkanAsset::unload_chunk(const Digest& digest) {
       break;
   }
   touch();
-  return absl::OkStatus();
 }
 
 absl::Status VulkanAsset::load_surface(uint32_t object, const SurfaceChunk& chunk) {
@@ -81,11 +68,10 @@ absl::Status VulkanAsset::load_surface(uint32_t object, const SurfaceChunk& chun
     append(&points, point, 4);
     append(&normals, &normal, 1);
   }
-  const SurfaceKeys keys = keys_of_surface(chunk, memory_);
 
   const AssetIndex::Target target{AssetIndex::Kind::kSurface, object};
   const std::lock_guard lock(mutex_);
-  if (surfaces_[object].keys != nullptr) return absl::OkStatus();
+  if (surfaces_[object]) return absl::OkStatus();
   uploads_.cancel(target);
   if (n > 0) {
     uploads_.push({target, points_.handle(), 16ull * o.first_element, std::move(points), 0, 0, false, false});
@@ -96,7 +82,7 @@ absl::Status VulkanAsset::load_surface(uint32_t object, const SurfaceChunk& chun
       throw;
     }
   }
-  surfaces_[object].keys = keys;
+  surfaces_[object] = true;
   if (map_ != nullptr && n > 0) {
     const LightmapMap::Range changed = map_->add(o, chunk.keys);
     map_table_.touch(4 * changed.begin, 4 * changed.end);
@@ -108,7 +94,7 @@ absl::Status VulkanAsset::load_surface(uint32_t object, const SurfaceChunk& chun
 }
 
 void VulkanAsset::unload_surface(uint32_t object) {
-  if (surfaces_[object].keys == nullptr) return;
+  if (!surfaces_[object]) return;
   const AssetIndex::Target target{AssetIndex::Kind::kSurface, object};
   const AssetIndex::Object& o = index_.objects()[object];
   uploads_.cancel(target);
@@ -116,131 +102,185 @@ void VulkanAsset::unload_surface(uint32_t object) {
     uploads_.push({target, points_.handle(), 16ull * o.first_element, std::pmr::vector<uint8_t>(memory_), 0,
                    16ull * o.elements, true, false});
   }
-  surfaces_[object].keys = nullptr;
+  surfaces_[object] = false;
 }
 
-absl::Status VulkanAsset::load_relight(uint32_t probe, const std::vector<uint32_t>& rays) {
+absl::Status VulkanAsset::load_relight(uint32_t probe, std::span<const uint32_t> rays, const Detail& detail) {
+  std::pmr::vector<uint8_t> data(memory_);
+  const size_t count = detail.all_rays ? rays.size() : coarse_rays_.size();
+  data.reserve(4 * (count + tile_words_));
   // What the probe sees, by tiles.
   std::vector<uint32_t> tiles(tile_words_);
-  for (const uint32_t ray : rays) {
+  for (size_t i = 0; i < count; ++i) {
+    const uint32_t ray = rays[detail.all_rays ? i : coarse_rays_[i]];
+    append(&data, &ray, 1);
     if (ray == gpu::kDead) continue;
     const uint32_t tile = ray == gpu::kSky ? sky_tile_ : ray >> tile_shift_;
     tiles[tile / 32] |= 1u << tile % 32;
   }
-  std::pmr::vector<uint8_t> data(memory_);
-  data.reserve(4 * (rays.size() + tiles.size()));
-  append(&data, rays.data(), rays.size());
   append(&data, tiles.data(), tiles.size());
 
   const AssetIndex::Target target{AssetIndex::Kind::kRelight, probe};
   const std::lock_guard lock(mutex_);
-  if (probes_[probe].resident) return absl::OkStatus();
+  Probe& p = probes_[probe];
+  if (p.newest() != nullptr && p.newest()->detail.all_rays == detail.all_rays) return absl::OkStatus();
   // The memory that the upload needs, before the slot is taken.
+  graves_.reserve(graves_.size() + uploads_.size() + 2);
   uploads_.push({target, VK_NULL_HANDLE, 0, std::move(data), 0, 0, true, false});
-  const absl::StatusOr<uint32_t> slot = relight_pools_->allocate();
+  const absl::StatusOr<uint32_t> slot = relight_pools_->allocate(detail.all_rays ? 0 : relight_pools_->kinds() - 1);
   if (!slot.ok()) {
     uploads_.pop_newest();
     return slot.status();
   }
   uploads_.newest().to = relight_pools_->buffer_of(*slot);
   uploads_.newest().offset = relight_pools_->offset_of(*slot);
-  probes_[probe] = {true, false, *slot};
+  if (p.next) {
+    uploads_.cancel_all_but_newest(target, 1);
+    bury(*p.next);
+  }
+  p.next = {detail, *slot};
   touch();
   return absl::OkStatus();
 }
 
 void VulkanAsset::unload_relight(uint32_t probe) {
   Probe& p = probes_[probe];
-  if (!p.resident) return;
-  graves_.push_back({recorded_ + context_->frames, true, p.slot, {}});
+  if (p.newest() == nullptr) return;
   uploads_.cancel({AssetIndex::Kind::kRelight, probe});
-  if (p.uploaded) {
-    write_slot(p.slot, gpu::kNoProbe);
-    for (const uint32_t c : index_.cells_of(probe)) {
-      ++cells_[c].missing;
-      refresh_cell(c);
-    }
+  if (p.next) bury(*p.next);
+  if (p.now) {
+    write_slot(p.now->slot, gpu::kNoProbe);
+    bury(*p.now);
   }
   p = {};
+  for (const uint32_t c : index_.cells_of(probe)) refresh_cell(c, false);
 }
 
-absl::Status VulkanAsset::load_cell(uint32_t cell, const SourceCell& source) {
+void VulkanAsset::bury(const LitProbe& probe) { graves_.push_back({recorded_ + context_->frames, probe.slot, {}}); }
+
+void VulkanAsset::bury(const LitCell& cell, uint32_t probes) {
+  graves_.push_back({recorded_ + context_->frames, std::nullopt, cell.place, cell.first_probe, probes});
+}
+
+/// Memory for a cell and its probe list.
+absl::StatusOr<VulkanAsset::LitCell> VulkanAsset::place_cell(uint32_t cell, const CellBlock& block) {
+  LitCell lit;
+  const std::optional<uint64_t> list = lists_->allocate(index_.cells()[cell].probes);
+  if (!list) return not_ready("what was unloaded is still in use; record frames_in_flight more frames");
+  lit.first_probe = static_cast<uint32_t>(*list);
+  const absl::StatusOr<CellPools::Place> place = cell_pools_->allocate(block.bytes);
+  if (!place.ok()) {
+    lists_->release(*list, index_.cells()[cell].probes);
+    return place.status();
+  }
+  lit.place = *place;
+  lit.jobs = block.jobs;
+  lit.octets = block.octets;
+  lit.project_quads = static_cast<uint32_t>(block.projection_bytes / 16);
+  lit.receive_quads = static_cast<uint32_t>(block.reconstruction_bytes / 16);
+  return lit;
+}
+
+absl::Status VulkanAsset::load_cell(uint32_t cell, const SourceCell& source, const Detail& detail) {
   LL_ASSIGN_OR_RETURN(CellBlock block, make_cell_block(source, context_->page_bytes, memory_));
   std::pmr::vector<uint32_t> elements(source.elements.begin(), source.elements.end(), memory_);
+  std::pmr::vector<uint8_t> list(memory_);
+  append(&list, source.probes.data(), source.probes.size());
 
   const AssetIndex::Target target{AssetIndex::Kind::kCell, cell};
   const std::lock_guard lock(mutex_);
   Cell& c = cells_[cell];
-  if (c.resident) return absl::OkStatus();
-  // The memory that the upload needs, before anything else changes.
-  uploads_.push({target, VK_NULL_HANDLE, 0, std::move(block.data), 0, 0, true, false});
-  const absl::StatusOr<CellPools::Place> place = [&]() -> absl::StatusOr<CellPools::Place> {
-    try {
-      return cell_pools_->allocate(block.bytes);
-    } catch (...) {
-      uploads_.pop_newest();
-      throw;
-    }
-  }();
-  const absl::Status marked = place.ok() ? mark_received(cell, source.elements) : place.status();
-  if (!marked.ok()) {
-    uploads_.pop_newest();
-    if (place.ok()) cell_pools_->release(*place, recorded_ + 1);
-    return marked;
+  if (c.newest() != nullptr && c.newest()->detail.max_rank == detail.max_rank) return absl::OkStatus();
+  // The memory that the uploads need, before anything else changes.
+  graves_.reserve(graves_.size() + uploads_.size() + 3);
+  const uint32_t uploads = list.empty() ? 1 : 2;
+  if (!list.empty()) uploads_.push({target, cell_probes_.handle(), 0, std::move(list), 0, 0, false, false});
+  try {
+    uploads_.push({target, VK_NULL_HANDLE, 0, std::move(block.data), 0, 0, true, false});
+  } catch (...) {
+    if (uploads == 2) uploads_.pop_newest();
+    throw;
   }
-  uploads_.newest().to = cell_pools_->pools()[place->pool].buffer.handle();
-  uploads_.newest().offset = place->offset;
-  c.resident = true;
-  c.uploaded = false;
-  c.place = *place;
+  const auto give_up = [&] {
+    for (uint32_t u = 0; u < uploads; ++u) uploads_.pop_newest();
+  };
+  absl::StatusOr<LitCell> lit = absl::InternalError("");
+  try {
+    lit = place_cell(cell, block);
+  } catch (...) {
+    give_up();
+    throw;
+  }
+  const absl::Status claimed = !lit.ok()               ? lit.status()
+                               : c.newest() != nullptr ? absl::OkStatus()
+                                                       : claim(cell, source.elements);
+  if (!claimed.ok()) {
+    give_up();
+    if (lit.ok()) {
+      lists_->release(lit->first_probe, index_.cells()[cell].probes);
+      cell_pools_->release(lit->place, recorded_ + 1);
+    }
+    return claimed;
+  }
+  uploads_.newest().to = cell_pools_->pools()[lit->place.pool].buffer.handle();
+  uploads_.newest().offset = lit->place.offset;
+  if (uploads == 2) uploads_.newest(1).offset = 4ull * lit->first_probe;
+  if (c.next) {
+    uploads_.cancel_all_but_newest(target, uploads);
+    bury(*c.next, index_.cells()[cell].probes);
+  }
+  c.next = *lit;
+  c.next->detail = detail;
   c.elements = std::move(elements);
-  c.record.pool = place->pool;
-  c.record.base = static_cast<uint32_t>(place->offset / gpu::kCellUnit);
-  c.record.jobs = block.jobs;
-  c.record.octets = block.octets;
-  c.record.project_quads = static_cast<uint32_t>(block.projection_bytes / 16);
-  c.record.receive_quads = static_cast<uint32_t>(block.reconstruction_bytes / 16);
   touch();
   return absl::OkStatus();
 }
 
 void VulkanAsset::unload_cell(uint32_t cell) {
   Cell& c = cells_[cell];
-  if (!c.resident) return;
-  graves_.push_back({recorded_ + context_->frames, false, 0, c.place});
+  if (c.newest() == nullptr) return;
   uploads_.cancel({AssetIndex::Kind::kCell, cell});
-  for (const uint32_t e : c.elements) received_[e] = false;
+  for (const auto* lit : {&c.now, &c.next}) {
+    if (*lit) bury(**lit, index_.cells()[cell].probes);
+  }
+  for (const uint32_t e : c.elements) received_[e] = kNobody;
   c.elements = std::pmr::vector<uint32_t>(memory_);
-  c.resident = c.uploaded = false;
-  refresh_cell(cell);
+  c.now.reset();
+  c.next.reset();
+  refresh_cell(cell, false);
 }
 
 /// No two receivers may share an E.
-absl::Status VulkanAsset::mark_received(uint32_t cell, const std::vector<uint32_t>& elements) {
+absl::Status VulkanAsset::claim(uint32_t cell, const std::vector<uint32_t>& elements) {
   for (size_t i = 0; i < elements.size(); ++i) {
-    if (!received_[elements[i]]) {
-      received_[elements[i]] = true;
+    if (received_[elements[i]] == kNobody) {
+      received_[elements[i]] = cell;
       continue;
     }
-    for (size_t marked = 0; marked < i; ++marked) received_[elements[marked]] = false;
+    for (size_t marked = 0; marked < i; ++marked) received_[elements[marked]] = kNobody;
     return absl::DataLossError("cell " + std::to_string(cell) +
                                " is corrupt: a receiver occurs twice; bake again or fetch it again");
   }
   return absl::OkStatus();
 }
 
+/// The frame that is being recorded has all of it.
 void VulkanAsset::uploaded(AssetIndex::Target target) {
   if (target.kind == AssetIndex::Kind::kCell) {
-    cells_[target.index].uploaded = true;
-    refresh_cell(target.index);
+    Cell& c = cells_[target.index];
+    if (c.now) bury(*c.now, index_.cells()[target.index].probes);
+    c.now = std::exchange(c.next, std::nullopt);
+    refresh_cell(target.index, true);
   } else if (target.kind == AssetIndex::Kind::kRelight) {
     Probe& p = probes_[target.index];
-    p.uploaded = true;
-    write_slot(p.slot, target.index);
-    for (const uint32_t c : index_.cells_of(target.index)) {
-      --cells_[c].missing;
-      refresh_cell(c);
+    const bool replaces = p.now.has_value();
+    if (replaces) {
+      write_slot(p.now->slot, gpu::kNoProbe);
+      bury(*p.now);
     }
+    p.now = std::exchange(p.next, std::nullopt);
+    write_slot(p.now->slot, target.index);
+    for (const uint32_t c : index_.cells_of(target.index)) refresh_cell(c, replaces);
   }
 }
 
@@ -249,13 +289,35 @@ void VulkanAsset::write_slot(uint32_t slot, uint32_t probe) {
   slot_table_.touch(slot * sizeof(gpu::Slot), (slot + 1) * sizeof(gpu::Slot));
 }
 
-void VulkanAsset::refresh_cell(uint32_t cell) {
+void VulkanAsset::refresh_cell(uint32_t cell, bool anew) {
   Cell& c = cells_[cell];
-  const bool live = c.resident && c.uploaded && c.missing == 0;
-  if (live == (c.record.live != 0)) return;
-  c.record.live = live ? ++generation_ : 0;
+  const std::span<const uint32_t> probes = index_.probes_of(cell);
+  const bool live =
+      c.now && std::all_of(probes.begin(), probes.end(), [this](uint32_t p) { return probes_[p].now.has_value(); });
+  const bool was_live = c.record.live != 0;
+  if (live == was_live && !(live && anew)) return;
+  if (live) {
+    c.record = {c.now->place.pool,
+                static_cast<uint32_t>(c.now->place.offset / gpu::kCellUnit),
+                c.now->jobs,
+                c.now->octets,
+                c.now->first_probe,
+                static_cast<uint32_t>(probes.size()),
+                ++generation_,
+                c.now->project_quads,
+                c.now->receive_quads,
+                0,
+                0,
+                0};
+  } else {
+    c.record.live = 0;
+  }
   cell_table_.as<gpu::Cell>()[cell] = c.record;
   cell_table_.touch(cell * sizeof(gpu::Cell), (cell + 1) * sizeof(gpu::Cell));
+  if (!live) return;
+  // Until it is so near that settle takes the last step.
+  const double left = 1 - static_cast<double>(settings_.options.fade);
+  if (left > 0) fade_frames_ = 1 + static_cast<uint32_t>(std::ceil(std::log(double{kArrived}) / std::log(left)));
 }
 
 void VulkanAsset::set(SurfaceInput input, uint64_t first, std::span<const float> rgb) {
@@ -309,10 +371,10 @@ bool VulkanAsset::uploads_pending() const {
 void VulkanAsset::fill_counts(lightloom_counts* out) const {
   const std::lock_guard lock(mutex_);
   *out = counts_of(index_);
-  for (const Surface& s : surfaces_) out->resident_surfaces += s.keys != nullptr;
-  for (const Probe& p : probes_) out->resident_probes += p.resident;
+  for (const bool resident : surfaces_) out->resident_surfaces += resident;
+  for (const Probe& p : probes_) out->resident_probes += p.newest() != nullptr;
   for (const Cell& c : cells_) {
-    out->resident_cells += c.resident;
+    out->resident_cells += c.newest() != nullptr;
     out->active_cells += c.record.live != 0;
   }
   out->pages = cell_pools_->count();
@@ -333,7 +395,8 @@ void VulkanAsset::fill_stats(lightloom_stats* out) const {
   out->updated_cells = last_.updated_cells;
   out->waiting_probes = last_.waiting_probes;
   out->waiting_cells = last_.waiting_cells;
-  out->relight_bytes = uint64_t{last_.updated_probes} * index_.rays() * 4;
+  const uint64_t coarse = last_.coarse_probes, all = last_.updated_probes - coarse;
+  out->relight_bytes = 4 * (all * index_.rays() + coarse * coarse_rays_.size());
   out->project_bytes = uint64_t{last_.project_quads} * 16;
   out->receive_bytes = uint64_t{last_.receive_quads} * 16;
 }

@@ -3,12 +3,12 @@
 #pragma once
 
 #include <array>
-#include <deque>
 #include <memory>
 #include <mutex>
 #include <vector>
 
 #include "runtime/backend.h"
+#include "runtime/block_allocator.h"
 #include "runtime/cell_block.h"
 #include "runtime/include/lightloom_vulkan.h"
 #include "runtime/lightmap_map.h"
@@ -35,13 +35,20 @@ enum class FrameKind { kWhole, kUploads };
 /// Threads: residency and set() from any, record() from one.
 class VulkanAsset {
  public:
+  /// Instead of a cell.
+  static constexpr uint32_t kNobody = UINT32_MAX;
+
   static absl::StatusOr<std::unique_ptr<VulkanAsset>> create(Context* context, const Pipelines* pipelines,
-                                                             AssetIndex index, const AssetOptions& options,
+                                                             std::shared_ptr<const AssetIndex> index,
+                                                             const AssetOptions& options,
                                                              std::pmr::memory_resource* memory);
 
-  const AssetIndex& index() const { return index_; }
-  absl::Status load_chunk(const Digest& digest, std::span<const uint8_t> bytes);
-  absl::Status unload_chunk(const Digest& digest);
+  // As Backend's.
+  bool resident(const AssetIndex::Target& target, const Detail& detail) const;
+  absl::Status load_surface(uint32_t object, const SurfaceChunk& chunk);
+  absl::Status load_relight(uint32_t probe, std::span<const uint32_t> rays, const Detail& detail);
+  absl::Status load_cell(uint32_t cell, const SourceCell& source, const Detail& detail);
+  void unload(const AssetIndex::Target& target);
   void set(SurfaceInput input, uint64_t first, std::span<const float> rgb);
   void set_environment(Vec3 radiance);
   void set_options(const lightloom_update_options& options);
@@ -60,46 +67,55 @@ class VulkanAsset {
   void fill_outputs(lightloom_vulkan_outputs* outputs) const;
 
  private:
-  struct Surface {
-    SurfaceKeys keys;  ///< null: not resident
-  };
-  struct Probe {
-    bool resident = false, uploaded = false;
+  /// A relight set or a cell in some detail. One lights the level; another one may be on its way to replace it.
+  struct LitProbe {
+    Detail detail;
     uint32_t slot = 0;
   };
-  struct Cell {
-    bool resident = false, uploaded = false;
-    uint32_t missing = 0;  ///< entries of its probe list that are not uploaded
+  struct LitCell {
+    Detail detail;
     CellPools::Place place;
+    uint32_t first_probe = 0;  ///< of its probe list in cell_probes_
+    uint32_t jobs = 0, octets = 0, project_quads = 0, receive_quads = 0;
+  };
+  struct Probe {
+    std::optional<LitProbe> now, next;
+    const LitProbe* newest() const { return next ? &*next : now ? &*now : nullptr; }
+  };
+  struct Cell {
+    std::optional<LitCell> now, next;
+    const LitCell* newest() const { return next ? &*next : now ? &*now : nullptr; }
     gpu::Cell record{};
-    std::pmr::vector<uint32_t> elements;
+    std::pmr::vector<uint32_t> elements;  ///< of its receivers
   };
   /// Memory that frames in flight may still use.
   struct Grave {
     uint32_t frame;  ///< the first that no longer uses it
-    bool is_slot;
-    uint32_t slot;
+    std::optional<uint32_t> slot;
     CellPools::Place place;
+    uint32_t first_probe = 0, probes = 0;
   };
 
-  VulkanAsset(Context* context, const Pipelines* pipelines, AssetIndex index, const AssetOptions& options,
-              std::pmr::memory_resource* memory);
+  VulkanAsset(Context* context, const Pipelines* pipelines, std::shared_ptr<const AssetIndex> index,
+              const AssetOptions& options, std::pmr::memory_resource* memory);
   absl::Status create_arrays();
   absl::Status create_sets();
 
-  absl::Status load_surface(uint32_t object, const SurfaceChunk& chunk);
-  absl::Status load_relight(uint32_t probe, const std::vector<uint32_t>& rays);
-  absl::Status load_cell(uint32_t cell, const SourceCell& source);
   void unload_surface(uint32_t object);
   void unload_relight(uint32_t probe);
   void unload_cell(uint32_t cell);
-  absl::Status mark_received(uint32_t cell, const std::vector<uint32_t>& elements);
+  absl::Status claim(uint32_t cell, const std::vector<uint32_t>& elements);
+  absl::StatusOr<LitCell> place_cell(uint32_t cell, const CellBlock& block);
+  void bury(const LitProbe& probe);
+  void bury(const LitCell& cell, uint32_t probes);
   void uploaded(AssetIndex::Target target);
   void write_slot(uint32_t slot, uint32_t probe);
-  void refresh_cell(uint32_t cell);
+  /// Brings the device's record of the cell up to date; `anew`: what it computes from is another model than before.
+  void refresh_cell(uint32_t cell, bool anew);
   void touch() { touched_ = true; }
 
-  void bury(uint32_t frame);
+  void free_graves(uint32_t frame);
+  float settle_share() const;
   bool tables_pending() const;
   bool nothing_to_do(const lightloom_frame_info& info, uint32_t frame);
   absl::Status record_uploads(VkCommandBuffer commands, uint32_t frame, FrameMemory* memory);
@@ -109,14 +125,15 @@ class VulkanAsset {
   void record_radiosity(VkCommandBuffer commands, uint32_t frame);
   void record_select_and_relight(VkCommandBuffer commands, uint32_t frame, FrameMemory* memory);
   void record_cells(VkCommandBuffer commands, uint32_t frame, FrameMemory* memory);
-  void record_settle(VkCommandBuffer commands);
+  void record_settle(VkCommandBuffer commands, float share);
   void record_image(VkCommandBuffer commands);
   void dispatch_indirect(VkCommandBuffer commands, size_t offset) const;
 
   Context* context_;
   const Pipelines* pipelines_;
   std::pmr::memory_resource* memory_;
-  const AssetIndex index_;
+  const std::shared_ptr<const AssetIndex> shared_index_;
+  const AssetIndex& index_;
   const AssetOptions options_;
   const uint32_t stride_;  ///< sh_stride
   uint32_t tile_shift_ = 6, tile_words_ = 0, sky_tile_ = 0;
@@ -124,7 +141,9 @@ class VulkanAsset {
   mutable std::mutex mutex_;  ///< guards all below
   std::array<ShadowTable, 3> inputs_;
   ShadowTable cell_table_, slot_table_, map_table_;
-  Buffer irradiance_, target_, radiosity_, points_, normals_, lambda_, sh_, changed_, dirty_, slot_seen_, stamps_;
+  Buffer irradiance_;  ///< with smoothing followed by where each E goes
+  Buffer radiosity_, points_, normals_, lambda_, changed_, dirty_, slot_seen_, stamps_;
+  std::array<Buffer, 2> sh_;  ///< of every ray, and of the coarse sets'
   Buffer active_slots_, cell_probes_, cell_dirty_, cell_seen_, active_cells_, control_;
   Image image_;
   std::unique_ptr<DescriptorSets> sets_;
@@ -136,22 +155,25 @@ class VulkanAsset {
   std::unique_ptr<CellPools> cell_pools_;
   std::unique_ptr<RelightPools> relight_pools_;
 
-  std::pmr::vector<Surface> surfaces_;
+  std::pmr::vector<uint32_t> coarse_rays_;
+  std::optional<BlockAllocator> lists_;  ///< ranges of cell_probes_
+  std::pmr::vector<bool> surfaces_;      ///< per object: resident
   std::pmr::vector<Probe> probes_;
   std::pmr::vector<Cell> cells_;
-  std::pmr::vector<bool> received_;  ///< per surface element
+  std::pmr::vector<uint32_t> received_;  ///< per surface element: the cell that has its receiver, or kNobody
   std::unique_ptr<LightmapMap> map_;
   uint32_t map_layers_ = 1;
   UploadQueue uploads_;
-  std::pmr::deque<Grave> graves_;
+  std::pmr::vector<Grave> graves_;  ///< by frame; with room for what the uploads will replace
 
   FrameSettings settings_;
   uint32_t generation_ = 0;
-  uint32_t recorded_ = 0;    ///< the newest frame
-  bool cleared_ = false;     ///< arrays are initialised
-  bool reset_ = false;       ///< E is to be set to 0
-  bool image_stale_ = true;  ///< all of the image is to be written
-  bool smooth_ = false;      ///< target_ holds what E goes towards
+  uint32_t recorded_ = 0;     ///< the newest frame
+  bool cleared_ = false;      ///< arrays are initialised
+  bool reset_ = false;        ///< E is to be set to 0
+  bool image_stale_ = true;   ///< all of the image is to be written
+  bool smooth_ = false;       ///< targets hold what E goes towards
+  uint32_t fade_frames_ = 0;  ///< that are left until a change of the model has arrived
   bool sky_changed_ = true;
   bool direct_overwritten_ = false;  ///< the direct pass wrote where the host's values were
   bool touched_ = true;              ///< something that the next frame must look at

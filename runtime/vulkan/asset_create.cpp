@@ -12,29 +12,32 @@ constexpr uint64_t kMaxTiles = 32768;
 
 }  // namespace
 
-VulkanAsset::VulkanAsset(Context* context, const Pipelines* pipelines, AssetIndex index, const AssetOptions& options,
-                         std::pmr::memory_resource* memory)
+VulkanAsset::VulkanAsset(Context* context, const Pipelines* pipelines, std::shared_ptr<const AssetIndex> index,
+                         const AssetOptions& options, std::pmr::memory_resource* memory)
     : context_(context),
       pipelines_(pipelines),
       memory_(memory),
-      index_(std::move(index)),
+      shared_index_(std::move(index)),
+      index_(*shared_index_),
       options_(options),
       stride_(static_cast<uint32_t>(sh_stride(static_cast<int>(index_.order())))),
       inputs_{ShadowTable(memory), ShadowTable(memory), ShadowTable(memory)},
       cell_table_(memory),
       slot_table_(memory),
       map_table_(memory),
-      surfaces_(index_.objects().size(), memory),
+      coarse_rays_(memory),
+      surfaces_(index_.objects().size(), false, memory),
       probes_(index_.probes().size(), memory),
       cells_(memory),
-      received_(index_.surface_elements(), false, memory),
+      received_(index_.surface_elements(), kNobody, memory),
       uploads_(memory),
       graves_(memory) {
-  settings_.options.smoothing = 1;
+  settings_.options.smoothing = settings_.options.fade = 1;
 }
 
 absl::StatusOr<std::unique_ptr<VulkanAsset>> VulkanAsset::create(Context* context, const Pipelines* pipelines,
-                                                                 AssetIndex index, const AssetOptions& options,
+                                                                 std::shared_ptr<const AssetIndex> index,
+                                                                 const AssetOptions& options,
                                                                  std::pmr::memory_resource* memory) {
   std::unique_ptr<VulkanAsset> asset(new VulkanAsset(context, pipelines, std::move(index), options, memory));
   LL_RETURN_IF_ERROR(asset->create_arrays());
@@ -48,48 +51,53 @@ absl::Status VulkanAsset::create_arrays() {
   sky_tile_ = static_cast<uint32_t>((S + (uint64_t{1} << tile_shift_) - 1) >> tile_shift_);
   tile_words_ = sky_tile_ / 32 + 1;
 
+  const uint32_t rays = P == 0 ? 0 : index_.rays();
+  const std::vector<uint32_t> coarse = lightloom::coarse_rays(rays);
+  coarse_rays_.assign(coarse.begin(), coarse.end());
+  std::vector<RelightRays> kinds = {{index_.rays(), &sh_[0]}};
+  if (coarse.size() < rays) kinds.push_back({static_cast<uint32_t>(coarse.size()), &sh_[1]});
+  relight_pools_ = std::make_unique<RelightPools>(context_, kinds, tile_words_, static_cast<uint32_t>(P), memory_);
+  LL_RETURN_IF_ERROR(relight_pools_->check());
+  const uint64_t slots = relight_pools_->slots();
+
   for (ShadowTable& input : inputs_) LL_RETURN_IF_ERROR(input.create(context_, 12 * S, 4));
   LL_RETURN_IF_ERROR(cell_table_.create(context_, C * sizeof(gpu::Cell), sizeof(gpu::Cell)));
-  LL_RETURN_IF_ERROR(slot_table_.create(context_, P * sizeof(gpu::Slot), sizeof(gpu::Slot), 0xff));
+  LL_RETURN_IF_ERROR(slot_table_.create(context_, slots * sizeof(gpu::Slot), sizeof(gpu::Slot), 0xff));
   const auto buffer = [this](Buffer* to, uint64_t bytes, BufferUse use = BufferUse::kDevice) -> absl::Status {
     LL_ASSIGN_OR_RETURN(*to, Buffer::create(context_, bytes, use));
     return absl::OkStatus();
   };
-  LL_RETURN_IF_ERROR(buffer(&irradiance_, 12 * S));
-  if (options_.smoothing) LL_RETURN_IF_ERROR(buffer(&target_, 12 * S));
+  LL_RETURN_IF_ERROR(buffer(&irradiance_, (options_.smoothing ? 24 : 12) * S));
   LL_RETURN_IF_ERROR(buffer(&radiosity_, 16 * S));
   LL_RETURN_IF_ERROR(buffer(&points_, 16 * S));
   LL_RETURN_IF_ERROR(buffer(&normals_, 4 * S));
   LL_RETURN_IF_ERROR(buffer(&lambda_, P * 3 * stride_ * sizeof(float)));
   LL_RETURN_IF_ERROR(buffer(&changed_, 4 * tile_words_));
-  LL_RETURN_IF_ERROR(buffer(&dirty_, 4 * P));
-  LL_RETURN_IF_ERROR(buffer(&slot_seen_, 4 * P));
+  LL_RETURN_IF_ERROR(buffer(&dirty_, 4 * slots));
+  LL_RETURN_IF_ERROR(buffer(&slot_seen_, 4 * slots));
   LL_RETURN_IF_ERROR(buffer(&stamps_, 4 * P));
-  LL_RETURN_IF_ERROR(buffer(&cell_probes_, 4 * index_.cell_probes().size()));
+  // A cell that is replaced has two lists for a while.
+  const uint64_t lists = index_.cell_probes().size() * 5 / 4 + 4096;
+  lists_.emplace(lists, memory_);
+  LL_RETURN_IF_ERROR(buffer(&cell_probes_, 4 * lists));
   LL_RETURN_IF_ERROR(buffer(&cell_dirty_, 4 * C));
   LL_RETURN_IF_ERROR(buffer(&cell_seen_, 4 * C));
   LL_RETURN_IF_ERROR(buffer(&active_cells_, C * sizeof(gpu::ActiveCell)));
   LL_RETURN_IF_ERROR(buffer(&control_, sizeof(gpu::Control), BufferUse::kIndirect));
 
   cells_.resize(C);
-  for (uint32_t c = 0; c < C; ++c) {
-    Cell& cell = cells_[c];
-    cell.missing = index_.cells()[c].probes;
-    cell.record.first_probe = index_.cells()[c].first_probe;
-    cell.record.probes = index_.cells()[c].probes;
-    cell_table_.as<gpu::Cell>()[c] = cell.record;
-  }
   if (C > 0) cell_table_.touch(0, cell_table_.bytes());
 
   const auto fill = [this](const Buffer& to, std::pmr::vector<uint8_t> bytes) {
     Upload upload{{AssetIndex::Kind::kSurface, UINT32_MAX}, to.handle(), 0, std::move(bytes), 0, 0, false, false};
     uploads_.push(std::move(upload));
   };
-  std::pmr::vector<uint8_t> table = sh_table(index_.order(), P == 0 ? 0 : index_.rays(), memory_);
-  LL_RETURN_IF_ERROR(buffer(&sh_, table.size()));
-  fill(sh_, std::move(table));
-  const auto* lists = reinterpret_cast<const uint8_t*>(index_.cell_probes().data());
-  fill(cell_probes_, std::pmr::vector<uint8_t>(lists, lists + 4 * index_.cell_probes().size(), memory_));
+  for (uint32_t kind = 0; kind < kinds.size(); ++kind) {
+    const std::vector<uint32_t> chosen = kind == 0 ? every_ray(rays) : coarse;
+    std::pmr::vector<uint8_t> table = sh_table(index_.order(), index_.rays(), chosen, memory_);
+    LL_RETURN_IF_ERROR(buffer(&sh_[kind], table.size()));
+    fill(sh_[kind], std::move(table));
+  }
 
   if (options_.image_format != VK_FORMAT_UNDEFINED && index_.width() > 0 && index_.height() > 0) {
     const uint64_t texels = uint64_t{kImageLayers} * index_.width() * index_.height();
@@ -111,27 +119,13 @@ absl::Status VulkanAsset::create_sets() {
       {Pass::kMark, pools},  {Pass::kRelight, pools},    {Pass::kProject, pools}, {Pass::kReceive, 2 * pools}};
   LL_ASSIGN_OR_RETURN(sets_, DescriptorSets::create(context_, pipelines_, demands));
 
-  const uint64_t slot_bytes = 4 * (uint64_t{index_.rays()} + tile_words_);
-  const PoolBindings bindings{&lambda_,
-                              &active_cells_,
-                              &control_,
-                              &irradiance_,
-                              options_.smoothing ? &target_ : nullptr,
-                              &slot_table_.device(),
-                              &changed_,
-                              &dirty_,
-                              &radiosity_,
-                              &sh_,
-                              &active_slots_};
-  relight_pools_ = std::make_unique<RelightPools>(context_, sets_.get(), bindings, slot_bytes,
-                                                  static_cast<uint32_t>(probes_.size()), memory_);
-  LL_RETURN_IF_ERROR(relight_pools_->check());
+  const PoolBindings bindings{&lambda_,  &active_cells_, &control_,   &irradiance_,  &slot_table_.device(),
+                              &changed_, &dirty_,        &radiosity_, &active_slots_};
+  relight_pools_->bind(sets_.get(), bindings);
   uint64_t cell_bytes = 0;
   for (const AssetIndex::Cell& c : index_.cells()) cell_bytes += c.chunk.size + c.chunk.size / 8 + 1024;
   cell_pools_ = std::make_unique<CellPools>(context_, sets_.get(), bindings, cell_bytes, memory_);
-  const uint64_t P = probes_.size(), per_pool = relight_pools_->pool_slots();
-  LL_ASSIGN_OR_RETURN(active_slots_,
-                      Buffer::create(context_, 4 * ((P + per_pool - 1) / per_pool * per_pool), BufferUse::kDevice));
+  LL_ASSIGN_OR_RETURN(active_slots_, Buffer::create(context_, 4ull * relight_pools_->slots(), BufferUse::kDevice));
 
   for (uint32_t f = 0; f < F; ++f) {
     LL_ASSIGN_OR_RETURN(const VkDescriptorSet radiosity, sets_->allocate(Pass::kRadiosity));
@@ -157,8 +151,8 @@ absl::Status VulkanAsset::create_sets() {
                                                  control_.whole(),
                                                  cell_seen_.whole()};
   LL_ASSIGN_OR_RETURN(select_cells_, sets_->make(Pass::kSelectCells, select_cells));
-  if (target_.exists()) {
-    const VkDescriptorBufferInfo settle[] = {target_.whole(), irradiance_.whole()};
+  if (options_.smoothing) {
+    const VkDescriptorBufferInfo settle[] = {irradiance_.whole()};
     LL_ASSIGN_OR_RETURN(settle_, sets_->make(Pass::kSettle, settle));
   }
   if (map_ != nullptr) {

@@ -67,16 +67,17 @@ void VulkanAsset::dispatch_indirect(VkCommandBuffer commands, size_t offset) con
 }
 
 /// Frees what no frame in flight uses any more.
-void VulkanAsset::bury(uint32_t frame) {
-  while (!graves_.empty() && graves_.front().frame <= frame) {
-    const Grave& g = graves_.front();
-    if (g.is_slot) {
-      relight_pools_->release(g.slot, frame);
+void VulkanAsset::free_graves(uint32_t frame) {
+  auto g = graves_.begin();
+  for (; g != graves_.end() && g->frame <= frame; ++g) {
+    if (g->slot) {
+      relight_pools_->release(*g->slot, frame);
     } else {
-      cell_pools_->release(g.place, frame);
+      cell_pools_->release(g->place, frame);
+      lists_->release(g->first_probe, g->probes);
     }
-    graves_.pop_front();
   }
+  graves_.erase(graves_.begin(), g);
   relight_pools_->free_retired(frame);
   cell_pools_->free_retired(frame);
 }
@@ -108,7 +109,7 @@ absl::Status VulkanAsset::record(VkCommandBuffer commands, const lightloom_frame
     return absl::InvalidArgumentError("direct_buffer is null or direct_offset is not aligned");
   }
   recorded_ = frame;
-  bury(frame);
+  free_graves(frame);
   if (kind == FrameKind::kUploads) {
     barrier_before(*context_, commands);
     LL_RETURN_IF_ERROR(record_uploads(commands, frame, memory));
@@ -146,8 +147,8 @@ void VulkanAsset::record_clears(VkCommandBuffer commands) {
   cell_table_.clear(commands, *context_);
   slot_table_.clear(commands, *context_);
   map_table_.clear(commands, *context_);
-  for (const Buffer* b : {&irradiance_, &target_, &radiosity_, &points_, &normals_, &lambda_, &dirty_, &slot_seen_,
-                          &stamps_, &cell_dirty_, &cell_seen_, &control_}) {
+  for (const Buffer* b : {&irradiance_, &radiosity_, &points_, &normals_, &lambda_, &dirty_, &slot_seen_, &stamps_,
+                          &cell_dirty_, &cell_seen_, &control_}) {
     if (b->exists()) vk.CmdFillBuffer(commands, b->handle(), 0, VK_WHOLE_SIZE, 0);
   }
   if (map_ != nullptr) {
@@ -168,18 +169,9 @@ absl::Status VulkanAsset::record_uploads(VkCommandBuffer commands, uint32_t fram
   if (!cleared_) record_clears(commands);
   cleared_ = true;
   if (reset_) {
-    for (const Buffer* b : {&irradiance_, &target_, &cell_seen_}) {
-      if (b->exists()) vk.CmdFillBuffer(commands, b->handle(), 0, VK_WHOLE_SIZE, 0);
-    }
+    for (const Buffer* b : {&irradiance_, &cell_seen_}) vk.CmdFillBuffer(commands, b->handle(), 0, VK_WHOLE_SIZE, 0);
     reset_ = false;
     image_stale_ = true;
-  }
-  const double alpha = static_cast<double>(settings_.options.smoothing);
-  if (alpha < 1 && !smooth_ && target_.exists()) {
-    barrier_between(*context_, commands);
-    const VkBufferCopy copy{0, 0, irradiance_.size()};
-    vk.CmdCopyBuffer(commands, irradiance_.handle(), target_.handle(), 1, &copy);
-    smooth_ = true;
   }
   // All but the cursors.
   vk.CmdFillBuffer(commands, control_.handle(), 16, sizeof(gpu::Control) - 16, 0);
@@ -195,6 +187,13 @@ absl::Status VulkanAsset::record_uploads(VkCommandBuffer commands, uint32_t fram
   slot_table_.record(commands, &staging, staging.room());
   cell_table_.record(commands, &staging, staging.room());
   map_table_.record(commands, &staging, staging.room());
+  if (!smooth_ && options_.smoothing && (settings_.options.smoothing < 1 || fade_frames_ > 0)) {
+    barrier_between(*context_, commands);
+    const uint64_t bytes = irradiance_.size() / 2;
+    const VkBufferCopy copy{0, bytes, bytes};
+    vk.CmdCopyBuffer(commands, irradiance_.handle(), irradiance_.handle(), 1, &copy);
+    smooth_ = true;
+  }
   return staging.flush();
 }
 
@@ -256,11 +255,12 @@ void VulkanAsset::record_radiosity(VkCommandBuffer commands, uint32_t frame) {
 }
 
 void VulkanAsset::record_select_and_relight(VkCommandBuffer commands, uint32_t frame, FrameMemory* memory) {
-  const uint32_t slot_words = static_cast<uint32_t>(relight_pools_->slot_bytes() / 4);
   const auto pools = relight_pools_->pools();
   for (uint32_t p = 0; p < pools.size(); ++p) {
     if (!pools[p].in_use()) continue;
-    const gpu::MarkPush push{p * relight_pools_->pool_slots(), pools[p].slots, slot_words, index_.rays(), tile_words_};
+    const gpu::MarkPush push{p * relight_pools_->pool_slots(), pools[p].slots,
+                             static_cast<uint32_t>(pools[p].slot_bytes / 4), relight_pools_->rays(pools[p].kind),
+                             tile_words_};
     pipelines_->bind(commands, Pass::kMark, pools[p].mark, push);
     dispatch_indirect(commands, offsetof(gpu::Control, mark));
   }
@@ -270,7 +270,8 @@ void VulkanAsset::record_select_and_relight(VkCommandBuffer commands, uint32_t f
                                      or_all(settings_.options.max_probes),
                                      frame,
                                      static_cast<uint32_t>(pipelines_->groups_of(cells_.size())),
-                                     context_->max_groups};
+                                     context_->max_groups,
+                                     relight_pools_->coarse_pool()};
   pipelines_->bind(commands, Pass::kSelectProbes, select_probes_, select);
   pipelines_->dispatch(commands, 1);
   barrier_between(*context_, commands);
@@ -278,14 +279,15 @@ void VulkanAsset::record_select_and_relight(VkCommandBuffer commands, uint32_t f
 
   for (uint32_t p = 0; p < pools.size(); ++p) {
     if (!pools[p].in_use()) continue;
+    const uint32_t rays = relight_pools_->rays(pools[p].kind);
     const gpu::RelightPush push{settings_.environment.x,
                                 settings_.environment.y,
                                 settings_.environment.z,
-                                static_cast<float>(4 * kPiD / index_.rays()),
-                                index_.rays(),
+                                static_cast<float>(4 * kPiD / rays),
+                                rays,
                                 stride_ / 8,
                                 p * relight_pools_->pool_slots(),
-                                slot_words,
+                                static_cast<uint32_t>(pools[p].slot_bytes / 4),
                                 p};
     pipelines_->bind(commands, Pass::kRelight, pools[p].relight, push);
     dispatch_indirect(commands, offsetof(gpu::Control, relight) + p * sizeof(gpu::Groups));
@@ -313,27 +315,35 @@ void VulkanAsset::record_cells(VkCommandBuffer commands, uint32_t frame, FrameMe
   }
   barrier_between(*context_, commands);
   memory->time(commands, frame, Step::kProject);
+  gpu::ReceivePush push{0, smooth_ ? 3 * index_.surface_elements() : 0, settings_.options.smoothing < 1 ? 1u : 0u};
   for (uint32_t p = 0; p < pools.size(); ++p) {
     if (!pools[p].in_use()) continue;
-    pipelines_->bind(commands, Pass::kReceive, smooth_ ? pools[p].receive_target : pools[p].receive,
-                     gpu::ReceivePush{p});
+    push.pool = p;
+    pipelines_->bind(commands, Pass::kReceive, pools[p].receive, push);
     dispatch_indirect(commands, offsetof(gpu::Control, receive) + p * sizeof(gpu::Groups));
   }
   barrier_between(*context_, commands);
-  if (smooth_) record_settle(commands);
+  if (smooth_) record_settle(commands, settle_share());
 }
 
-void VulkanAsset::record_settle(VkCommandBuffer commands) {
+/// How far E goes to its target in this frame.
+float VulkanAsset::settle_share() const {
+  if (settings_.options.smoothing < 1) return settings_.options.smoothing;
+  return fade_frames_ > 1 ? settings_.options.fade : 1;
+}
+
+void VulkanAsset::record_settle(VkCommandBuffer commands, float share) {
   const uint32_t values = 3 * index_.surface_elements();
   if (values > 0) {
-    pipelines_->bind(commands, Pass::kSettle, settle_,
-                     gpu::SettlePush{values, settings_.options.smoothing, kArrived, kArrivedBlack});
+    pipelines_->bind(commands, Pass::kSettle, settle_, gpu::SettlePush{values, values, share, kArrived, kArrivedBlack});
     pipelines_->dispatch(commands, pipelines_->groups_of(values));
     barrier_between(*context_, commands);
   }
   image_stale_ = true;
-  // At alpha 1 it has arrived.
-  if (settings_.options.smoothing >= 1) smooth_ = false;
+  // Cells that wait for their turn have not begun to fade.
+  if (fade_frames_ > 0 && (fade_frames_ == 1 || last_.waiting_cells == 0)) --fade_frames_;
+  // With a share of 1 it has arrived.
+  if (share >= 1) smooth_ = false;
 }
 
 void VulkanAsset::record_image(VkCommandBuffer commands) {

@@ -43,7 +43,7 @@ absl::StatusOr<std::unique_ptr<VulkanBackend>> VulkanBackend::create(const light
       std::min<uint64_t>(info.page_bytes == 0 ? kDefaultPageBytes : info.page_bytes, c.limits.maxStorageBufferRange);
   c.budget = info.byte_budget;
   backend->asset_options_ = {(info.flags & LIGHTLOOM_CREATE_SMOOTHING) != 0, info.image_format};
-  backend->options_.smoothing = 1;
+  backend->options_.smoothing = backend->options_.fade = 1;
 
   LL_ASSIGN_OR_RETURN(backend->pipelines_, Pipelines::create(&c));
   const uint64_t staging = info.staging_bytes == 0 ? kDefaultStagingBytes : info.staging_bytes;
@@ -72,14 +72,15 @@ absl::Status VulkanBackend::load_manifest(std::span<const uint8_t> bytes) {
   // The old asset goes first: both may not fit.
   unload();
   LL_ASSIGN_OR_RETURN(const Manifest manifest, decode_manifest(bytes));
-  LL_ASSIGN_OR_RETURN(AssetIndex index, AssetIndex::create(manifest, memory_));
-  LL_ASSIGN_OR_RETURN(asset_,
-                      VulkanAsset::create(&context_, pipelines_.get(), std::move(index), asset_options_, memory_));
+  LL_ASSIGN_OR_RETURN(const auto index, AssetIndex::create_shared(manifest, memory_));
+  LL_ASSIGN_OR_RETURN(asset_, VulkanAsset::create(&context_, pipelines_.get(), index, asset_options_, memory_));
   asset_->set_options(options_);
+  use(index);
   return absl::OkStatus();
 }
 
 void VulkanBackend::unload() {
+  use(nullptr);
   asset_ = nullptr;
   frame_ = taken_ = 0;
   frame_memory_->forget();
@@ -88,8 +89,8 @@ void VulkanBackend::unload() {
 }
 
 absl::Status VulkanBackend::set_options(const lightloom_update_options& options) {
-  if (options.smoothing < 1 && !asset_options_.smoothing) {
-    return absl::InvalidArgumentError("smoothing below 1 needs LIGHTLOOM_CREATE_SMOOTHING");
+  if ((options.smoothing < 1 || options.fade < 1) && !asset_options_.smoothing) {
+    return absl::InvalidArgumentError("smoothing and fade below 1 need LIGHTLOOM_CREATE_SMOOTHING");
   }
   options_ = options;
   if (asset_ != nullptr) asset_->set_options(options);

@@ -20,12 +20,6 @@ class VulkanBackend final : public Backend {
 
   absl::Status load_manifest(std::span<const uint8_t> manifest) override;
   void unload() override;
-  bool loaded() const override { return asset_ != nullptr; }
-  const AssetIndex& index() const override { return asset_->index(); }
-  absl::Status load_chunk(const Digest& digest, std::span<const uint8_t> bytes) override {
-    return asset_->load_chunk(digest, bytes);
-  }
-  absl::Status unload_chunk(const Digest& digest) override { return asset_->unload_chunk(digest); }
   void set(SurfaceInput input, uint64_t first, std::span<const float> rgb) override { asset_->set(input, first, rgb); }
   void set_environment(Vec3 radiance) override { asset_->set_environment(radiance); }
   absl::Status set_options(const lightloom_update_options& options) override;
@@ -39,12 +33,26 @@ class VulkanBackend final : public Backend {
   absl::Status record(VkCommandBuffer commands, const lightloom_frame_info& info, FrameKind kind = FrameKind::kWhole);
   void fill_outputs(lightloom_vulkan_outputs* outputs) const { asset_->fill_outputs(outputs); }
 
+ protected:
+  bool resident(const AssetIndex::Target& target, const Detail& detail) const override {
+    return asset_->resident(target, detail);
+  }
+  absl::Status load_surface(uint32_t object, const SurfaceChunk& chunk) override {
+    return asset_->load_surface(object, chunk);
+  }
+  absl::Status load_relight(uint32_t probe, std::span<const uint32_t> rays, const Detail& detail) override {
+    return asset_->load_relight(probe, rays, detail);
+  }
+  absl::Status load_cell(uint32_t cell, const SourceCell& source, const Detail& detail) override {
+    return asset_->load_cell(cell, source, detail);
+  }
+  void unload_target(const AssetIndex::Target& target) override { asset_->unload(target); }
+
  private:
-  explicit VulkanBackend(std::pmr::memory_resource* memory) : memory_(memory) {}
+  explicit VulkanBackend(std::pmr::memory_resource* memory) : Backend(memory) {}
   absl::Status take(uint32_t frame);
   absl::Status run_frames(uint32_t frames, FrameKind kind);
 
-  std::pmr::memory_resource* memory_;
   Context context_;
   AssetOptions asset_options_;
   lightloom_vulkan_device own_device_{};

@@ -64,7 +64,7 @@ constexpr std::array<PassInfo, kPasses> kPassInfo = {
     PassInfo{kSelectCellsSpirv, {7, false, false}, sizeof(gpu::SelectCellsPush)},
     PassInfo{kProjectSpirv, {7, false, false}, sizeof(gpu::ProjectPush)},
     PassInfo{kReceiveSpirv, {7, false, false}, sizeof(gpu::ReceivePush)},
-    PassInfo{kSettleSpirv, {2, false, false}, sizeof(gpu::SettlePush)},
+    PassInfo{kSettleSpirv, {1, false, false}, sizeof(gpu::SettlePush)},
     PassInfo{kImage16Spirv, {2, true, false}, sizeof(gpu::ImagePush)},
     PassInfo{kImage32Spirv, {2, true, false}, sizeof(gpu::ImagePush)},
 };

@@ -48,9 +48,8 @@ absl::Status CellPools::create(Pool* pool, uint64_t least) {
   if (context_->budget != 0) bytes = std::min(bytes, context_->budget - std::min(context_->budget, context_->bytes));
   bytes = std::max(bytes, least) / gpu::kCellUnit * gpu::kCellUnit;
 
-  for (auto [set, pass] : {std::pair(&pool->project, Pass::kProject), std::pair(&pool->receive, Pass::kReceive),
-                           std::pair(&pool->receive_target, Pass::kReceive)}) {
-    if (*set != VK_NULL_HANDLE || (set == &pool->receive_target && bindings_.target == nullptr)) continue;
+  for (auto [set, pass] : {std::pair(&pool->project, Pass::kProject), std::pair(&pool->receive, Pass::kReceive)}) {
+    if (*set != VK_NULL_HANDLE) continue;
     LL_ASSIGN_OR_RETURN(*set, sets_->allocate(pass));
   }
   BlockAllocator blocks(bytes, memory_);
@@ -62,18 +61,14 @@ absl::Status CellPools::create(Pool* pool, uint64_t least) {
   const VkDescriptorBufferInfo project[] = {
       data, data, data, data, bindings_.lambda->whole(), bindings_.active_cells->whole(), bindings_.control->whole()};
   sets_->write(pool->project, Pass::kProject, project);
-  VkDescriptorBufferInfo receive[] = {data,
-                                      data,
-                                      data,
-                                      data,
-                                      bindings_.active_cells->whole(),
-                                      bindings_.control->whole(),
-                                      bindings_.irradiance->whole()};
+  const VkDescriptorBufferInfo receive[] = {data,
+                                            data,
+                                            data,
+                                            data,
+                                            bindings_.active_cells->whole(),
+                                            bindings_.control->whole(),
+                                            bindings_.irradiance->whole()};
   sets_->write(pool->receive, Pass::kReceive, receive);
-  if (bindings_.target != nullptr) {
-    receive[6] = bindings_.target->whole();
-    sets_->write(pool->receive_target, Pass::kReceive, receive);
-  }
   return absl::OkStatus();
 }
 
@@ -92,35 +87,46 @@ void CellPools::free_retired(uint32_t frame) {
   }
 }
 
-RelightPools::RelightPools(Context* context, DescriptorSets* sets, const PoolBindings& bindings, uint64_t slot_bytes,
-                           uint32_t probes, std::pmr::memory_resource* memory)
-    : context_(context), sets_(sets), bindings_(bindings), slot_bytes_(slot_bytes), slots_(probes), free_(memory) {
-  const uint64_t fit = context->page_bytes / slot_bytes / gpu::kSlotGranule * gpu::kSlotGranule;
+RelightPools::RelightPools(Context* context, std::span<const RelightRays> kinds, uint32_t tile_words, uint32_t probes,
+                           std::pmr::memory_resource* memory)
+    : context_(context), kinds_(kinds.begin(), kinds.end(), memory), probes_(probes), free_(memory) {
+  const auto slot_bytes = [&](const RelightRays& r) { return 4 * (uint64_t{r.rays} + tile_words); };
+  const uint32_t slots = static_cast<uint32_t>(rounded_up(uint64_t{probes} + probes / 8 + 1, gpu::kSlotGranule));
+  const uint64_t fit = context->page_bytes / slot_bytes(kinds[0]) / gpu::kSlotGranule * gpu::kSlotGranule;
   pool_slots_ = static_cast<uint32_t>(
       std::clamp<uint64_t>(fit, gpu::kSlotGranule, rounded_up(std::max(1u, probes), gpu::kSlotGranule)));
-  free_.reserve(probes);
-  for (uint32_t s = probes; s > 0; --s) free_.push_back(s - 1);
+  pools_per_kind_ = (slots + pool_slots_ - 1) / pool_slots_;
+  if (!check().ok()) return;
+  for (uint32_t kind = 0; kind < kinds.size(); ++kind) {
+    const uint32_t first = kind * pools_per_kind_ * pool_slots_;
+    auto& free = free_.emplace_back();
+    free.reserve(slots);
+    for (uint32_t s = slots; s > 0; --s) free.push_back(first + s - 1);
+    for (uint32_t p = 0; p < pools_per_kind_; ++p) {
+      Pool& pool = pools_[kind * pools_per_kind_ + p];
+      pool.kind = kind;
+      pool.slot_bytes = slot_bytes(kinds[kind]);
+      pool.slots = std::min(pool_slots_, slots - p * pool_slots_);
+    }
+  }
 }
 
 absl::Status RelightPools::check() const {
-  if (slots_ <= uint64_t{pool_slots_} * gpu::kMaxPools) return absl::OkStatus();
-  return absl::UnimplementedError("asset has " + std::to_string(slots_) + " probes, pages hold " +
-                                  std::to_string(uint64_t{pool_slots_} * gpu::kMaxPools) +
+  if (uint64_t{pools_per_kind_} * kinds() <= gpu::kMaxPools) return absl::OkStatus();
+  return absl::UnimplementedError("asset has " + std::to_string(probes_) + " probes, pages hold " +
+                                  std::to_string(uint64_t{pool_slots_} * gpu::kMaxPools / kinds()) +
                                   "; bake with fewer relight rays or create with larger pages");
 }
 
-absl::StatusOr<uint32_t> RelightPools::allocate() {
-  // As many slots as probes, so the rest waits for frames in flight.
-  if (free_.empty()) return not_ready("what was unloaded is still in use; record frames_in_flight more frames");
-  const uint32_t slot = free_.back();
+absl::StatusOr<uint32_t> RelightPools::allocate(uint32_t kind) {
+  std::pmr::vector<uint32_t>& free = free_[kind];
+  if (free.empty()) return not_ready("what was unloaded is still in use; record frames_in_flight more frames");
+  const uint32_t slot = free.back();
   Pool& pool = pools_[slot / pool_slots_];
-  if (!pool.buffer.exists()) {
-    pool.slots = std::min(pool_slots_, slots_ - slot / pool_slots_ * pool_slots_);
-    LL_RETURN_IF_ERROR(create(&pool));
-  }
+  if (!pool.buffer.exists()) LL_RETURN_IF_ERROR(create(&pool));
   ++pool.used;
   pool.retired = 0;
-  free_.pop_back();
+  free.pop_back();
   return slot;
 }
 
@@ -131,12 +137,12 @@ absl::Status RelightPools::create(Pool* pool) {
   if (pool->relight == VK_NULL_HANDLE) {
     LL_ASSIGN_OR_RETURN(pool->relight, sets_->allocate(Pass::kRelight));
   }
-  LL_ASSIGN_OR_RETURN(pool->buffer, Buffer::create(context_, pool->slots * slot_bytes_, BufferUse::kDevice));
+  LL_ASSIGN_OR_RETURN(pool->buffer, Buffer::create(context_, pool->slots * pool->slot_bytes, BufferUse::kDevice));
   const VkDescriptorBufferInfo mark[] = {pool->buffer.whole(), bindings_.slots->whole(), bindings_.changed->whole(),
                                          bindings_.dirty->whole()};
   sets_->write(pool->mark, Pass::kMark, mark);
   const VkDescriptorBufferInfo relight[] = {
-      pool->buffer.whole(),      bindings_.radiosity->whole(),    bindings_.sh->whole(),
+      pool->buffer.whole(),      bindings_.radiosity->whole(),    kinds_[pool->kind].sh->whole(),
       bindings_.lambda->whole(), bindings_.active_slots->whole(), bindings_.slots->whole(),
       bindings_.control->whole()};
   sets_->write(pool->relight, Pass::kRelight, relight);
@@ -145,7 +151,7 @@ absl::Status RelightPools::create(Pool* pool) {
 
 void RelightPools::release(uint32_t slot, uint32_t frame) {
   Pool& pool = pools_[slot / pool_slots_];
-  free_.push_back(slot);
+  free_[pool.kind].push_back(slot);
   if (--pool.used == 0) pool.retired = frame + context_->frames;
 }
 

@@ -12,8 +12,9 @@ void Staging::copy(VkCommandBuffer commands, VkBuffer to, uint64_t offset, const
   at_ += bytes;
 }
 
-void UploadQueue::cancel(AssetIndex::Target target) {
-  for (Upload& u : uploads_) {
+void UploadQueue::cancel_all_but_newest(AssetIndex::Target target, size_t newest) {
+  for (size_t i = 0; i + newest < uploads_.size(); ++i) {
+    Upload& u = uploads_[i];
     if (u.target.kind == target.kind && u.target.index == target.index) u.cancelled = true;
   }
 }

@@ -48,11 +48,14 @@ class UploadQueue {
   explicit UploadQueue(std::pmr::memory_resource* memory) : uploads_(memory) {}
 
   bool empty() const { return uploads_.empty(); }
+  size_t size() const { return uploads_.size(); }
   void push(Upload upload) { uploads_.push_back(std::move(upload)); }
-  Upload& newest() { return uploads_.back(); }
+  /// `before`: how many are newer.
+  Upload& newest(size_t before = 0) { return uploads_[uploads_.size() - 1 - before]; }
   /// Frees the newest upload again.
   void pop_newest() { uploads_.pop_back(); }
-  void cancel(AssetIndex::Target target);
+  void cancel(AssetIndex::Target target) { cancel_all_but_newest(target, 0); }
+  void cancel_all_but_newest(AssetIndex::Target target, size_t newest);
   uint64_t pending_bytes() const;
 
   /// Records at most `bytes`; calls finished(target) after the last byte of a target's uploads.

@@ -38,8 +38,9 @@ class TestRuntime {
                        uint32_t workgroup_size = 0, uint64_t staging_bytes = 0) {
     lightloom_create_info info{};
     info.struct_size = sizeof info;
-    info.flags = LIGHTLOOM_CREATE_VALIDATION | flags;
-    if (std::getenv("LIGHTLOOM_GPU_ASSISTED") != nullptr) info.flags |= LIGHTLOOM_CREATE_GPU_ASSISTED;
+    const bool on_cpu = (flags & LIGHTLOOM_CREATE_CPU) != 0;
+    info.flags = (on_cpu ? 0u : uint32_t{LIGHTLOOM_CREATE_VALIDATION}) | flags;
+    if (!on_cpu && std::getenv("LIGHTLOOM_GPU_ASSISTED") != nullptr) info.flags |= LIGHTLOOM_CREATE_GPU_ASSISTED;
     info.message = Received::add;
     info.message_user = &received_;
     info.page_bytes = page_bytes;
@@ -66,6 +67,15 @@ class TestRuntime {
     info.read_user = &asset;
     return lightloom_load(runtime_, &info);
   }
+  lightloom_result load_part(const SyntheticAsset& asset, const Digest& digest, uint32_t max_rank,
+                             bool coarse_rays = false) {
+    const std::vector<uint8_t>& bytes = asset.chunks.at(digest);
+    lightloom_detail detail{};
+    detail.struct_size = sizeof detail;
+    detail.max_rank = max_rank;
+    detail.flags = coarse_rays ? LIGHTLOOM_DETAIL_COARSE_RAYS : 0;
+    return lightloom_load_chunk_part(runtime_, digest.bytes.data(), bytes.data(), bytes.size(), &detail);
+  }
   void light(const SurfaceLight& l) {
     ASSERT_EQ(lightloom_set_direct(runtime_, &l.direct[0].x, 0, l.direct.size()), LIGHTLOOM_OK);
     ASSERT_EQ(lightloom_set_albedo(runtime_, &l.albedo[0].x, 0, l.albedo.size()), LIGHTLOOM_OK);
@@ -83,13 +93,14 @@ class TestRuntime {
     EXPECT_EQ(lightloom_get_stats(runtime_, &s), LIGHTLOOM_OK);
     return s;
   }
-  void options(uint32_t max_probes, uint32_t max_cells, float epsilon = 0, float smoothing = 1) {
+  void options(uint32_t max_probes, uint32_t max_cells, float epsilon = 0, float smoothing = 1, float fade = 1) {
     lightloom_update_options o{};
     o.struct_size = sizeof o;
     o.max_probes = max_probes;
     o.max_cells = max_cells;
     o.epsilon = epsilon;
     o.smoothing = smoothing;
+    o.fade = fade;
     ASSERT_EQ(lightloom_set_update_options(runtime_, &o), LIGHTLOOM_OK);
   }
   lightloom_counts counts() const {

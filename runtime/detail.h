@@ -1,0 +1,28 @@
+// How much of a chunk is resident. Columns are ordered by singular value, so a prefix is a coarser cell; few of a
+// probe's rays are a noisier relight set.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "runtime/asset_source.h"
+
+namespace lightloom {
+
+struct Detail {
+  uint32_t max_rank = UINT32_MAX;  ///< of cells: columns of each cluster, at most; the uniform one is always there
+  bool all_rays = true;            ///< of relight sets; else coarse_rays()
+
+  bool operator==(const Detail&) const = default;
+};
+
+/// Keeps the first `max_rank` columns of each cluster.
+void limit_rank(CellChunk* chunk, uint32_t max_rank);
+
+/// Which of N relight rays stand for all when they are far away: about 256, one of each run of as many successive rays
+/// (a band of equal area), the one nearest to a golden spiral of so few points. All, if N is not much more.
+std::vector<uint32_t> coarse_rays(uint32_t rays);
+/// 0..rays-1.
+std::vector<uint32_t> every_ray(uint32_t rays);
+
+}  // namespace lightloom
