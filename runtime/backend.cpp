@@ -52,4 +52,10 @@ absl::Status Backend::unload_chunk(const Digest& digest) {
   return absl::OkStatus();
 }
 
+absl::Status Backend::drop_detail(const Digest& digest) {
+  LL_ASSIGN_OR_RETURN(const AssetIndex::Target target, find_chunk(index(), digest));
+  if (target.kind != AssetIndex::Kind::kSurface) drop_target_detail(target);
+  return absl::OkStatus();
+}
+
 }  // namespace lightloom

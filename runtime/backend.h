@@ -38,6 +38,8 @@ class Backend {
   /// What is resident in another detail keeps to light the level until the frame that has all of the new one.
   absl::Status load_chunk(const Digest& digest, std::span<const uint8_t> bytes, const Detail& detail = {});
   absl::Status unload_chunk(const Digest& digest);
+  /// Back to the base, at once. Without a base nothing changes.
+  absl::Status drop_detail(const Digest& digest);
   /// `rgb` is 3·count finite values for elements [first, …); they exist.
   virtual void set(SurfaceInput input, uint64_t first, std::span<const float> rgb) = 0;
   virtual void set_environment(Vec3 radiance) = 0;
@@ -62,6 +64,7 @@ class Backend {
   /// Limited to the rank already.
   virtual absl::Status load_cell(uint32_t cell, const SourceCell& source, const Detail& detail) = 0;
   virtual void unload_target(const AssetIndex::Target& target) = 0;
+  virtual void drop_target_detail(const AssetIndex::Target& target) = 0;
 
   std::pmr::memory_resource* const memory_;
 

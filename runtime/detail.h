@@ -12,6 +12,7 @@ namespace lightloom {
 struct Detail {
   uint32_t max_rank = UINT32_MAX;  ///< of cells: columns of each cluster, at most; the uniform one is always there
   bool all_rays = true;            ///< of relight sets; else coarse_rays()
+  bool base = false;  ///< stays resident beneath what is loaded later, and lights again once that is dropped
 
   bool operator==(const Detail&) const = default;
 };

@@ -194,11 +194,19 @@ lightloom_result lightloom_load_chunk_part(lightloom_runtime* runtime, const uin
   return with_asset(runtime, [&](Backend& backend) -> absl::Status {
     if (digest == nullptr || bytes == nullptr) return absl::InvalidArgumentError("the digest or the chunk is null");
     if (detail == nullptr || detail->struct_size < sizeof *detail || detail->reserved != 0 ||
-        (detail->flags & ~uint32_t{LIGHTLOOM_DETAIL_COARSE_RAYS}) != 0) {
+        (detail->flags & ~uint32_t{LIGHTLOOM_DETAIL_COARSE_RAYS | LIGHTLOOM_DETAIL_BASE}) != 0) {
       return absl::InvalidArgumentError("lightloom_detail is null, its struct_size is wrong or a flag is unknown");
     }
     return backend.load_chunk(lightloom::digest_of(digest), {static_cast<const uint8_t*>(bytes), size},
-                              {detail->max_rank, (detail->flags & LIGHTLOOM_DETAIL_COARSE_RAYS) == 0});
+                              {detail->max_rank, (detail->flags & LIGHTLOOM_DETAIL_COARSE_RAYS) == 0,
+                               (detail->flags & LIGHTLOOM_DETAIL_BASE) != 0});
+  });
+}
+
+lightloom_result lightloom_drop_detail(lightloom_runtime* runtime, const uint8_t digest[32]) {
+  return with_asset(runtime, [&](Backend& backend) -> absl::Status {
+    if (digest == nullptr) return absl::InvalidArgumentError("the digest is null");
+    return backend.drop_detail(lightloom::digest_of(digest));
   });
 }
 

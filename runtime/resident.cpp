@@ -52,6 +52,10 @@ absl::StatusOr<std::vector<uint32_t>> resolve_relight(const AssetIndex& index, u
   return index.elements(chunk, objects, keys);
 }
 
+absl::Status late_base() {
+  return absl::InvalidArgumentError("a base must be loaded before other details of its chunk; unload that first");
+}
+
 lightloom_counts counts_of(const AssetIndex& index) {
   lightloom_counts out{};
   out.surface_elements = index.surface_elements();

@@ -30,6 +30,9 @@ absl::StatusOr<std::vector<uint32_t>> resolve_relight(const AssetIndex& index, u
                                                       std::span<const uint8_t> bytes,
                                                       absl::FunctionRef<SurfaceKeys(uint32_t)> resident);
 
+/// InvalidArgument: a base comes first.
+absl::Status late_base();
+
 /// What the index alone says; the rest is 0.
 lightloom_counts counts_of(const AssetIndex& index);
 

@@ -23,8 +23,8 @@ absl::Status SimdBackend::load_manifest(std::span<const uint8_t> bytes) {
                        " bytes, the budget is " + std::to_string(options_.byte_budget));
   }
   surfaces_.assign(index->objects().size(), false);
-  probes_.assign(index->probes().size(), std::nullopt);
-  cells_.assign(index->cells().size(), std::nullopt);
+  probes_.assign(index->probes().size(), {});
+  cells_.assign(index->cells().size(), {});
   coarse_rays_ = coarse_rays(index->rays());
   runtime_ = std::move(runtime);
   use(index);
@@ -42,11 +42,11 @@ bool SimdBackend::resident(const AssetIndex::Target& target, const Detail& detai
     case AssetIndex::Kind::kSurface:
       return surfaces_[target.index];
     case AssetIndex::Kind::kRelight:
-      return probes_[target.index] && probes_[target.index]->all_rays == detail.all_rays;
     case AssetIndex::Kind::kCell:
       break;
   }
-  return cells_[target.index] && cells_[target.index]->max_rank == detail.max_rank;
+  const Details& d = target.kind == AssetIndex::Kind::kCell ? cells_[target.index] : probes_[target.index];
+  return d.now == detail || d.base == detail;
 }
 
 void SimdBackend::unload_target(const AssetIndex::Target& target) {
@@ -57,13 +57,35 @@ void SimdBackend::unload_target(const AssetIndex::Target& target) {
       break;
     case AssetIndex::Kind::kRelight:
       runtime_->unload_probe(target.index);
-      probes_[target.index].reset();
+      probes_[target.index] = {};
       break;
     case AssetIndex::Kind::kCell:
       runtime_->unload_cell(target.index);
-      cells_[target.index].reset();
+      cells_[target.index] = {};
       break;
   }
+}
+
+void SimdBackend::drop_target_detail(const AssetIndex::Target& target) {
+  const std::lock_guard lock(mutex_);
+  Details& d = target.kind == AssetIndex::Kind::kCell ? cells_[target.index] : probes_[target.index];
+  if (!d.base) return;
+  d.now = std::exchange(d.base, std::nullopt);
+  if (target.kind == AssetIndex::Kind::kCell) {
+    runtime_->drop_cell_detail(target.index);
+  } else {
+    runtime_->drop_probe_detail(target.index);
+  }
+}
+
+absl::StatusOr<bool> SimdBackend::goes_over_base(const Details& details, const Detail& detail) {
+  if (detail.base && details.now) return late_base();
+  return details.now && details.now->base;
+}
+
+void SimdBackend::note(const Detail& detail, bool over_base, Details* details) {
+  if (over_base) details->base = details->now;
+  details->now = detail;
 }
 
 absl::Status SimdBackend::load_surface(uint32_t object, const SurfaceChunk&) {
@@ -80,18 +102,20 @@ absl::Status SimdBackend::load_relight(uint32_t probe, std::span<const uint32_t>
   }
   simd::PackedProbe packed = runtime_->pack_probe(rays);
   const std::lock_guard lock(mutex_);
-  LL_RETURN_IF_ERROR(check_budget(packed.bytes(), runtime_->probe_bytes(probe)));
-  runtime_->load_probe(probe, std::move(packed));
-  probes_[probe] = detail;
+  LL_ASSIGN_OR_RETURN(const bool over_base, goes_over_base(probes_[probe], detail));
+  LL_RETURN_IF_ERROR(check_budget(packed.bytes(), over_base ? 0 : runtime_->probe_bytes(probe)));
+  runtime_->load_probe(probe, std::move(packed), over_base);
+  note(detail, over_base, &probes_[probe]);
   return absl::OkStatus();
 }
 
 absl::Status SimdBackend::load_cell(uint32_t cell, const SourceCell& source, const Detail& detail) {
   simd::PackedCell packed = runtime_->pack_cell(source);
   const std::lock_guard lock(mutex_);
-  LL_RETURN_IF_ERROR(check_budget(packed.bytes(), runtime_->cell_bytes(cell)));
-  LL_RETURN_IF_ERROR(runtime_->load_cell(cell, std::move(packed)));
-  cells_[cell] = detail;
+  LL_ASSIGN_OR_RETURN(const bool over_base, goes_over_base(cells_[cell], detail));
+  LL_RETURN_IF_ERROR(check_budget(packed.bytes(), over_base ? 0 : runtime_->cell_bytes(cell)));
+  LL_RETURN_IF_ERROR(runtime_->load_cell(cell, std::move(packed), over_base));
+  note(detail, over_base, &cells_[cell]);
   return absl::OkStatus();
 }
 

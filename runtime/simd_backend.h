@@ -40,6 +40,7 @@ class SimdBackend final : public Backend {
   absl::Status load_relight(uint32_t probe, std::span<const uint32_t> rays, const Detail& detail) override;
   absl::Status load_cell(uint32_t cell, const SourceCell& source, const Detail& detail) override;
   void unload_target(const AssetIndex::Target& target) override;
+  void drop_target_detail(const AssetIndex::Target& target) override;
 
  private:
   absl::Status check_budget(uint64_t more, uint64_t less) const;
@@ -50,8 +51,15 @@ class SimdBackend final : public Backend {
 
   mutable std::mutex mutex_;  ///< guards all below, and that the budget holds
   lightloom_update_options update_options_{};
-  std::vector<bool> surfaces_;                         ///< per object: resident
-  std::vector<std::optional<Detail>> probes_, cells_;  ///< what is resident
+  std::vector<bool> surfaces_;  ///< per object: resident
+  /// What is resident of a chunk.
+  struct Details {
+    std::optional<Detail> now, base;
+  };
+  /// Whether another one is to be loaded over what is there.
+  static absl::StatusOr<bool> goes_over_base(const Details& details, const Detail& detail);
+  static void note(const Detail& detail, bool over_base, Details* details);
+  std::vector<Details> probes_, cells_;
 };
 
 }  // namespace lightloom

@@ -137,13 +137,18 @@ typedef struct lightloom_detail {
   uint32_t reserved; /* 0 */
 } lightloom_detail;
 
-enum { LIGHTLOOM_DETAIL_COARSE_RAYS = 1u << 0 /* relight sets: about 256 of their rays */ };
+enum {
+  LIGHTLOOM_DETAIL_COARSE_RAYS = 1u << 0, /* relight sets: about 256 of their rays */
+  LIGHTLOOM_DETAIL_BASE = 1u << 1         /* stays resident beneath other details, which must be loaded later */
+};
 
 /* As lightloom_load_chunk. If the chunk is resident in another detail, that one lights the level until the frame which
  * has all of the new one (both take memory until then), and E goes to its new values by `fade`. */
 LIGHTLOOM_API lightloom_result lightloom_load_chunk_part(lightloom_runtime* runtime, const uint8_t digest[32],
                                                          const void* bytes, uint64_t size,
                                                          const lightloom_detail* detail);
+/* Back to the base of the chunk, which needs no upload. Without a base nothing changes. */
+LIGHTLOOM_API lightloom_result lightloom_drop_detail(lightloom_runtime* runtime, const uint8_t digest[32]);
 
 /* Its memory is used again once frames_in_flight more frames are recorded. Without its surface chunk an object
  * gets no light from the direct pass; cells and probes that name it go on. A chunk that is not resident is no

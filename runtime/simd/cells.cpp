@@ -27,6 +27,7 @@ size_t each_receiver(const PackedCell& cell, size_t most, Body body) {
 Cells::Cells(std::pmr::memory_resource* memory, const AssetIndex& index)
     : index_(index),
       packed_(index.cells().size(), memory),
+      base_(index.cells().size(), memory),
       missing_probes_(memory, index.cells().size()),
       received_(memory, (size_t{index.surface_elements()} + 63) / 64),
       turns_(memory, static_cast<uint32_t>(index.cells().size())),
@@ -60,8 +61,9 @@ void Cells::release(const PackedCell& cell) {
   });
 }
 
-absl::Status Cells::load(uint32_t cell, PackedCell packed) {
+absl::Status Cells::load(uint32_t cell, PackedCell packed, bool over_base) {
   const bool replaces = resident(cell);
+  LL_CHECK(!over_base || (replaces && !has_base(cell)));
   if (replaces) release(packed_[cell]);
   if (!claim(packed)) {
     if (replaces) LL_CHECK(claim(packed_[cell]));
@@ -72,11 +74,28 @@ absl::Status Cells::load(uint32_t cell, PackedCell packed) {
     ++resident_;
     active_ += missing_probes_[cell] == 0;
   }
-  bytes_ += packed.bytes() - packed_[cell].bytes();
+  if (over_base) {
+    base_[cell] = std::move(packed_[cell]);
+  } else {
+    bytes_ -= packed_[cell].bytes();
+  }
+  bytes_ += packed.bytes();
   packed_[cell] = std::move(packed);
+  computes_anew(cell);
+  return absl::OkStatus();
+}
+
+void Cells::drop_detail(uint32_t cell) {
+  if (!has_base(cell)) return;
+  bytes_ -= packed_[cell].bytes();
+  packed_[cell] = std::move(base_[cell]);
+  base_[cell] = {};
+  computes_anew(cell);
+}
+
+void Cells::computes_anew(uint32_t cell) {
   fades_[cell] = lit_[cell];
   if (active(cell)) turns_.add(cell);
-  return absl::OkStatus();
 }
 
 void Cells::unload(uint32_t cell) {
@@ -84,8 +103,9 @@ void Cells::unload(uint32_t cell) {
   active_ -= active(cell);
   turns_.remove(cell);
   release(packed_[cell]);
-  bytes_ -= packed_[cell].bytes();
+  bytes_ -= packed_[cell].bytes() + base_[cell].bytes();
   packed_[cell] = {};
+  base_[cell] = {};
   --resident_;
 }
 
@@ -107,10 +127,7 @@ void Cells::probe_unloaded(uint32_t probe) {
 }
 
 void Cells::probe_replaced(uint32_t probe) {
-  for (const uint32_t c : index_.cells_of(probe)) {
-    fades_[c] = lit_[c];
-    if (active(c)) turns_.add(c);
-  }
+  for (const uint32_t c : index_.cells_of(probe)) computes_anew(c);
 }
 
 void Cells::lambda_changed(uint32_t probe) {

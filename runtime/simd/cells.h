@@ -18,10 +18,13 @@ class Cells {
   uint32_t active_count() const { return active_; }
   uint32_t waiting() const { return turns_.waiting(); }
 
-  /// Replaces the cell if it is resident. DataLoss if a receiver is that of another resident cell, or twice in this one;
+  /// Replaces the cell if it is resident, or `over_base`, puts it above the one that is: that one stays. DataLoss if a receiver is that of another resident cell, or twice in this one;
   /// then nothing has changed.
-  absl::Status load(uint32_t cell, PackedCell packed);
+  absl::Status load(uint32_t cell, PackedCell packed, bool over_base);
+  /// Back to the base, if there is one.
+  void drop_detail(uint32_t cell);
   uint64_t bytes_of(uint32_t cell) const { return packed_[cell].bytes(); }
+  bool has_base(uint32_t cell) const { return base_[cell].clusters.size() != 0; }
   /// The E of its receivers stays what it was.
   void unload(uint32_t cell);
   /// A cell is active while it is resident with all its probes.
@@ -50,11 +53,13 @@ class Cells {
   /// Sets or clears the receivers' bits; false, and nothing is set, if one is set already.
   bool claim(const PackedCell& cell);
   void release(const PackedCell& cell);
+  void computes_anew(uint32_t cell);
 
   const AssetIndex& index_;
   std::pmr::vector<PackedCell> packed_;
-  Array<uint32_t> missing_probes_;  ///< per cell: entries of its probe list that are not resident
-  Array<uint64_t> received_;        ///< bit per surface element: a receiver of a resident cell
+  std::pmr::vector<PackedCell> base_;  ///< beneath it
+  Array<uint32_t> missing_probes_;     ///< per cell: entries of its probe list that are not resident
+  Array<uint64_t> received_;           ///< bit per surface element: a receiver of a resident cell
   Turns turns_;
   std::span<const uint32_t> chosen_;
   Array<uint8_t> lit_;    ///< per cell: E shows some model of it

@@ -46,6 +46,7 @@ bool intersect(const Array<uint64_t>& a, const Array<uint64_t>& b) {
 Probes::Probes(std::pmr::memory_resource* memory, const AssetIndex& index)
     : lambda_stride_(lambda_stride_of(static_cast<int>(index.order()))),
       packed_(index.probes().size(), memory),
+      base_(index.probes().size(), memory),
       lambda_(memory, index.probes().size() * 3 * lambda_stride_),
       grouped_(memory, index.probes().size()),
       flags_(memory, index.probes().size()),
@@ -61,18 +62,34 @@ Probes::Probes(std::pmr::memory_resource* memory, const AssetIndex& index)
   bytes_ = all_.sh.bytes() + coarse_.sh.bytes() + lambda_.bytes();
 }
 
-void Probes::load(uint32_t probe, PackedProbe packed) {
+void Probes::load(uint32_t probe, PackedProbe packed, bool over_base) {
   LL_CHECK(packed.elements.size() == all_.count || packed.elements.size() == coarse_.count);
+  LL_CHECK(!over_base || (resident(probe) && base_[probe].elements.size() == 0));
   resident_ += !resident(probe);
-  bytes_ += packed.bytes() - packed_[probe].bytes();
+  if (over_base) {
+    base_[probe] = std::move(packed_[probe]);
+  } else {
+    bytes_ -= packed_[probe].bytes();
+  }
+  bytes_ += packed.bytes();
   packed_[probe] = std::move(packed);
   turns_.add(probe);
 }
 
+bool Probes::drop_detail(uint32_t probe) {
+  if (base_[probe].elements.size() == 0) return false;
+  bytes_ -= packed_[probe].bytes();
+  packed_[probe] = std::move(base_[probe]);
+  base_[probe] = {};
+  turns_.add(probe);
+  return true;
+}
+
 void Probes::unload(uint32_t probe) {
   if (!resident(probe)) return;
-  bytes_ -= packed_[probe].bytes();
+  bytes_ -= packed_[probe].bytes() + base_[probe].bytes();
   packed_[probe] = {};
+  base_[probe] = {};
   --resident_;
   turns_.remove(probe);
 }

@@ -17,8 +17,10 @@ class Probes {
   uint64_t bytes_of(uint32_t probe) const { return packed_[probe].bytes(); }
   uint32_t resident_count() const { return resident_; }
   uint32_t waiting() const { return turns_.waiting(); }
-  /// Replaces the probe if it is resident. REQUIRES: `packed` has the manifest's rays, or the coarse_rays() of them.
-  void load(uint32_t probe, PackedProbe packed);
+  /// Replaces the probe if it is resident, or `over_base`, puts it above the one that is. REQUIRES: `packed` has the manifest's rays, or the coarse_rays() of them.
+  void load(uint32_t probe, PackedProbe packed, bool over_base);
+  /// Back to the base, if there is one; whether there was.
+  bool drop_detail(uint32_t probe);
   /// Its λ stays what it was.
   void unload(uint32_t probe);
   /// λ = 0, and every resident probe waits.
@@ -51,6 +53,7 @@ class Probes {
   Rays all_, coarse_;
   uint64_t relit_rays_ = 0;
   std::pmr::vector<PackedProbe> packed_;
+  std::pmr::vector<PackedProbe> base_;  ///< beneath it
   Array<float> lambda_;
   Array<uint32_t> grouped_;  ///< of relight()
   /// Per probe: sees a change, then λ has changed. Bytes, so that threads may write neighbours.

@@ -25,9 +25,9 @@ SimdRuntime::SimdRuntime(const AssetIndex& index, const SimdOptions& options)
       probes_(memory_, index),
       cells_(memory_, index) {}
 
-absl::Status SimdRuntime::load_cell(uint32_t cell, simd::PackedCell packed) {
+absl::Status SimdRuntime::load_cell(uint32_t cell, simd::PackedCell packed, bool over_base) {
   const std::lock_guard lock(mutex_);
-  return cells_.load(cell, std::move(packed));
+  return cells_.load(cell, std::move(packed), over_base);
 }
 
 void SimdRuntime::unload_cell(uint32_t cell) {
@@ -35,10 +35,10 @@ void SimdRuntime::unload_cell(uint32_t cell) {
   cells_.unload(cell);
 }
 
-void SimdRuntime::load_probe(uint32_t probe, simd::PackedProbe packed) {
+void SimdRuntime::load_probe(uint32_t probe, simd::PackedProbe packed, bool over_base) {
   const std::lock_guard lock(mutex_);
   const bool replaces = probes_.resident(probe);
-  probes_.load(probe, std::move(packed));
+  probes_.load(probe, std::move(packed), over_base);
   if (replaces) {
     cells_.probe_replaced(probe);
   } else {
@@ -51,6 +51,16 @@ void SimdRuntime::unload_probe(uint32_t probe) {
   if (!probes_.resident(probe)) return;
   probes_.unload(probe);
   cells_.probe_unloaded(probe);
+}
+
+void SimdRuntime::drop_cell_detail(uint32_t cell) {
+  const std::lock_guard lock(mutex_);
+  cells_.drop_detail(cell);
+}
+
+void SimdRuntime::drop_probe_detail(uint32_t probe) {
+  const std::lock_guard lock(mutex_);
+  if (probes_.drop_detail(probe)) cells_.probe_replaced(probe);
 }
 
 void SimdRuntime::set(simd::Surface::Input input, uint32_t first, std::span<const float> rgb) {

@@ -65,12 +65,15 @@ class SimdRuntime {
     return simd::pack_probe(rays, surface_.elements(), memory_);
   }
 
-  /// Indices into the manifest. What is resident already is replaced. A cell takes part once all its probes are
+  /// Indices into the manifest. What is resident already is replaced, or `over_base`, kept beneath. A cell takes part once all its probes are
   /// resident; until then, and after it is unloaded, its E stays what it was. DataLoss: two resident receivers are the
   /// same surface element.
-  absl::Status load_cell(uint32_t cell, simd::PackedCell packed);
+  absl::Status load_cell(uint32_t cell, simd::PackedCell packed, bool over_base = false);
   void unload_cell(uint32_t cell);
-  void load_probe(uint32_t probe, simd::PackedProbe packed);
+  void load_probe(uint32_t probe, simd::PackedProbe packed, bool over_base = false);
+  /// Back to what something was loaded over.
+  void drop_cell_detail(uint32_t cell);
+  void drop_probe_detail(uint32_t probe);
   void unload_probe(uint32_t probe);
 
   /// Elements first … take the values, packed linear RGB; units as in lightloom.h. What is equal to what was set

@@ -21,20 +21,29 @@ void append(std::pmr::vector<uint8_t>* to, const T* values, size_t count) {
 
 }  // namespace
 
+template <class Lit>
+bool VulkanAsset::Resident<Lit>::has(const Detail& detail) const {
+  return (newest() != nullptr && newest()->detail == detail) || (base && base->detail == detail);
+}
+
+template <class Lit>
+absl::Status VulkanAsset::Resident<Lit>::check(const Detail& detail) const {
+  if (detail.base && newest() != nullptr) return late_base();
+  if (next && next->detail.base) return not_ready("the chunk's base is on its way; record a frame");
+  return absl::OkStatus();
+}
+
 bool VulkanAsset::resident(const AssetIndex::Target& target, const Detail& detail) const {
   const std::lock_guard lock(mutex_);
   switch (target.kind) {
     case AssetIndex::Kind::kSurface:
       return surfaces_[target.index];
-    case AssetIndex::Kind::kRelight: {
-      const LitProbe* const newest = probes_[target.index].newest();
-      return newest != nullptr && newest->detail.all_rays == detail.all_rays;
-    }
+    case AssetIndex::Kind::kRelight:
+      return probes_[target.index].has(detail);
     case AssetIndex::Kind::kCell:
       break;
   }
-  const LitCell* const newest = cells_[target.index].newest();
-  return newest != nullptr && newest->detail.max_rank == detail.max_rank;
+  return cells_[target.index].has(detail);
 }
 
 void VulkanAsset::unload(const AssetIndex::Target& target) {
@@ -50,6 +59,13 @@ void VulkanAsset::unload(const AssetIndex::Target& target) {
       unload_cell(target.index);
       break;
   }
+  touch();
+}
+
+void VulkanAsset::drop_detail(const AssetIndex::Target& target) {
+  const std::lock_guard lock(mutex_);
+  if (target.kind == AssetIndex::Kind::kRelight) drop_relight_detail(target.index);
+  if (target.kind == AssetIndex::Kind::kCell) drop_cell_detail(target.index);
   touch();
 }
 
@@ -123,7 +139,8 @@ absl::Status VulkanAsset::load_relight(uint32_t probe, std::span<const uint32_t>
   const AssetIndex::Target target{AssetIndex::Kind::kRelight, probe};
   const std::lock_guard lock(mutex_);
   Probe& p = probes_[probe];
-  if (p.newest() != nullptr && p.newest()->detail.all_rays == detail.all_rays) return absl::OkStatus();
+  if (p.has(detail)) return absl::OkStatus();
+  LL_RETURN_IF_ERROR(p.check(detail));
   // The memory that the upload needs, before the slot is taken.
   graves_.reserve(graves_.size() + uploads_.size() + 2);
   uploads_.push({target, VK_NULL_HANDLE, 0, std::move(data), 0, 0, true, false});
@@ -147,19 +164,34 @@ void VulkanAsset::unload_relight(uint32_t probe) {
   Probe& p = probes_[probe];
   if (p.newest() == nullptr) return;
   uploads_.cancel({AssetIndex::Kind::kRelight, probe});
-  if (p.next) bury(*p.next);
-  if (p.now) {
-    write_slot(p.now->slot, gpu::kNoProbe);
-    bury(*p.now);
+  if (p.now) write_slot(p.now->slot, gpu::kNoProbe);
+  for (const auto* lit : {&p.now, &p.next, &p.base}) {
+    if (*lit) bury(**lit);
   }
   p = {};
   for (const uint32_t c : index_.cells_of(probe)) refresh_cell(c, false);
 }
 
+void VulkanAsset::drop_relight_detail(uint32_t probe) {
+  Probe& p = probes_[probe];
+  if (!p.base && !(p.now && p.now->detail.base)) return;
+  if (p.next) {
+    uploads_.cancel({AssetIndex::Kind::kRelight, probe});
+    bury(*std::exchange(p.next, std::nullopt));
+  }
+  if (!p.base) return;
+  write_slot(p.now->slot, gpu::kNoProbe);
+  bury(*p.now);
+  p.now = std::exchange(p.base, std::nullopt);
+  write_slot(p.now->slot, probe);
+  for (const uint32_t c : index_.cells_of(probe)) refresh_cell(c, true);
+}
+
 void VulkanAsset::bury(const LitProbe& probe) { graves_.push_back({recorded_ + context_->frames, probe.slot, {}}); }
 
-void VulkanAsset::bury(const LitCell& cell, uint32_t probes) {
-  graves_.push_back({recorded_ + context_->frames, std::nullopt, cell.place, cell.first_probe, probes});
+void VulkanAsset::bury(const LitCell& lit, uint32_t cell) {
+  graves_.push_back(
+      {recorded_ + context_->frames, std::nullopt, lit.place, lit.first_probe, index_.cells()[cell].probes});
 }
 
 /// Memory for a cell and its probe list.
@@ -190,7 +222,8 @@ absl::Status VulkanAsset::load_cell(uint32_t cell, const SourceCell& source, con
   const AssetIndex::Target target{AssetIndex::Kind::kCell, cell};
   const std::lock_guard lock(mutex_);
   Cell& c = cells_[cell];
-  if (c.newest() != nullptr && c.newest()->detail.max_rank == detail.max_rank) return absl::OkStatus();
+  if (c.has(detail)) return absl::OkStatus();
+  LL_RETURN_IF_ERROR(c.check(detail));
   // The memory that the uploads need, before anything else changes.
   graves_.reserve(graves_.size() + uploads_.size() + 3);
   const uint32_t uploads = list.empty() ? 1 : 2;
@@ -227,7 +260,7 @@ absl::Status VulkanAsset::load_cell(uint32_t cell, const SourceCell& source, con
   if (uploads == 2) uploads_.newest(1).offset = 4ull * lit->first_probe;
   if (c.next) {
     uploads_.cancel_all_but_newest(target, uploads);
-    bury(*c.next, index_.cells()[cell].probes);
+    bury(*c.next, cell);
   }
   c.next = *lit;
   c.next->detail = detail;
@@ -240,14 +273,28 @@ void VulkanAsset::unload_cell(uint32_t cell) {
   Cell& c = cells_[cell];
   if (c.newest() == nullptr) return;
   uploads_.cancel({AssetIndex::Kind::kCell, cell});
-  for (const auto* lit : {&c.now, &c.next}) {
-    if (*lit) bury(**lit, index_.cells()[cell].probes);
+  for (const auto* lit : {&c.now, &c.next, &c.base}) {
+    if (*lit) bury(**lit, cell);
   }
   for (const uint32_t e : c.elements) received_[e] = kNobody;
   c.elements = std::pmr::vector<uint32_t>(memory_);
   c.now.reset();
   c.next.reset();
+  c.base.reset();
   refresh_cell(cell, false);
+}
+
+void VulkanAsset::drop_cell_detail(uint32_t cell) {
+  Cell& c = cells_[cell];
+  if (!c.base && !(c.now && c.now->detail.base)) return;
+  if (c.next) {
+    uploads_.cancel({AssetIndex::Kind::kCell, cell});
+    bury(*std::exchange(c.next, std::nullopt), cell);
+  }
+  if (!c.base) return;
+  bury(*c.now, cell);
+  c.now = std::exchange(c.base, std::nullopt);
+  refresh_cell(cell, true);
 }
 
 /// No two receivers may share an E.
@@ -268,14 +315,20 @@ absl::Status VulkanAsset::claim(uint32_t cell, const std::vector<uint32_t>& elem
 void VulkanAsset::uploaded(AssetIndex::Target target) {
   if (target.kind == AssetIndex::Kind::kCell) {
     Cell& c = cells_[target.index];
-    if (c.now) bury(*c.now, index_.cells()[target.index].probes);
+    if (c.now && c.now->detail.base) {
+      c.base = c.now;
+    } else if (c.now) {
+      bury(*c.now, target.index);
+    }
     c.now = std::exchange(c.next, std::nullopt);
     refresh_cell(target.index, true);
   } else if (target.kind == AssetIndex::Kind::kRelight) {
     Probe& p = probes_[target.index];
     const bool replaces = p.now.has_value();
-    if (replaces) {
-      write_slot(p.now->slot, gpu::kNoProbe);
+    if (replaces) write_slot(p.now->slot, gpu::kNoProbe);
+    if (replaces && p.now->detail.base) {
+      p.base = p.now;
+    } else if (replaces) {
       bury(*p.now);
     }
     p.now = std::exchange(p.next, std::nullopt);

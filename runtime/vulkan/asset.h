@@ -49,6 +49,7 @@ class VulkanAsset {
   absl::Status load_relight(uint32_t probe, std::span<const uint32_t> rays, const Detail& detail);
   absl::Status load_cell(uint32_t cell, const SourceCell& source, const Detail& detail);
   void unload(const AssetIndex::Target& target);
+  void drop_detail(const AssetIndex::Target& target);
   void set(SurfaceInput input, uint64_t first, std::span<const float> rgb);
   void set_environment(Vec3 radiance);
   void set_options(const lightloom_update_options& options);
@@ -78,13 +79,16 @@ class VulkanAsset {
     uint32_t first_probe = 0;  ///< of its probe list in cell_probes_
     uint32_t jobs = 0, octets = 0, project_quads = 0, receive_quads = 0;
   };
-  struct Probe {
-    std::optional<LitProbe> now, next;
-    const LitProbe* newest() const { return next ? &*next : now ? &*now : nullptr; }
+  template <class Lit>
+  struct Resident {
+    std::optional<Lit> now, next;
+    std::optional<Lit> base;  ///< beneath `now`
+    const Lit* newest() const { return next ? &*next : now ? &*now : nullptr; }
+    bool has(const Detail& detail) const;
+    absl::Status check(const Detail& detail) const;  ///< whether another detail may be loaded
   };
-  struct Cell {
-    std::optional<LitCell> now, next;
-    const LitCell* newest() const { return next ? &*next : now ? &*now : nullptr; }
+  struct Probe : Resident<LitProbe> {};
+  struct Cell : Resident<LitCell> {
     gpu::Cell record{};
     std::pmr::vector<uint32_t> elements;  ///< of its receivers
   };
@@ -104,10 +108,12 @@ class VulkanAsset {
   void unload_surface(uint32_t object);
   void unload_relight(uint32_t probe);
   void unload_cell(uint32_t cell);
+  void drop_relight_detail(uint32_t probe);
+  void drop_cell_detail(uint32_t cell);
   absl::Status claim(uint32_t cell, const std::vector<uint32_t>& elements);
   absl::StatusOr<LitCell> place_cell(uint32_t cell, const CellBlock& block);
   void bury(const LitProbe& probe);
-  void bury(const LitCell& cell, uint32_t probes);
+  void bury(const LitCell& lit, uint32_t cell);
   void uploaded(AssetIndex::Target target);
   void write_slot(uint32_t slot, uint32_t probe);
   /// Brings the device's record of the cell up to date; `anew`: what it computes from is another model than before.

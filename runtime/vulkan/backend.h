@@ -47,6 +47,7 @@ class VulkanBackend final : public Backend {
     return asset_->load_cell(cell, source, detail);
   }
   void unload_target(const AssetIndex::Target& target) override { asset_->unload(target); }
+  void drop_target_detail(const AssetIndex::Target& target) override { asset_->drop_detail(target); }
 
  private:
   explicit VulkanBackend(std::pmr::memory_resource* memory) : Backend(memory) {}

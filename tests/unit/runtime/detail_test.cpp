@@ -152,7 +152,7 @@ TEST_P(DetailTest, AnyOrderOfDetailsEndsAtTheSameLight) {
   for (int step = 0; step < 600; ++step) {
     const Digest& cell = cells[rng.next_below(static_cast<uint32_t>(cells.size()))].chunk.digest;
     const Digest& probe = probes[rng.next_below(static_cast<uint32_t>(probes.size()))].relight.digest;
-    switch (rng.next_below(5)) {
+    switch (rng.next_below(6)) {
       case 0:
         ASSERT_EQ(lightloom_unload_chunk(runtime->get(), (rng.next_below(2) == 0 ? cell : probe).bytes.data()),
                   LIGHTLOOM_OK);
@@ -161,12 +161,25 @@ TEST_P(DetailTest, AnyOrderOfDetailsEndsAtTheSameLight) {
       case 2: {
         const uint32_t rank = rng.next_below(4) == 0 ? kAll : rng.next_below(6);
         const lightloom_result result = runtime->load_part(asset_, cell, rank);
-        ASSERT_TRUE(result == LIGHTLOOM_OK || result == LIGHTLOOM_ERROR_NOT_READY);
+        ASSERT_TRUE(result == LIGHTLOOM_OK || result == LIGHTLOOM_ERROR_NOT_READY)
+            << joined(runtime->received().errors);
         break;
       }
       case 3: {
         const lightloom_result result = runtime->load_part(asset_, probe, 0, rng.next_below(2) == 0);
-        ASSERT_TRUE(result == LIGHTLOOM_OK || result == LIGHTLOOM_ERROR_NOT_READY);
+        ASSERT_TRUE(result == LIGHTLOOM_OK || result == LIGHTLOOM_ERROR_NOT_READY)
+            << joined(runtime->received().errors);
+        break;
+      }
+      case 4: {
+        const bool is_cell = rng.next_below(2) == 0;
+        if (rng.next_below(2) == 0) {
+          ASSERT_EQ(lightloom_drop_detail(runtime->get(), (is_cell ? cell : probe).bytes.data()), LIGHTLOOM_OK);
+          break;
+        }
+        const lightloom_result result = runtime->load_part(asset_, is_cell ? cell : probe, 1, true, true);
+        ASSERT_TRUE(result == LIGHTLOOM_OK || result == LIGHTLOOM_ERROR_NOT_READY ||
+                    result == LIGHTLOOM_ERROR_INVALID_ARGUMENT);
         break;
       }
       default:
@@ -180,6 +193,40 @@ TEST_P(DetailTest, AnyOrderOfDetailsEndsAtTheSameLight) {
   settle(*runtime);
   EXPECT_EQ(runtime->counts().active_cells, cells.size());
   EXPECT_LT(p999_error(runtime->irradiance(), whole), 1e-4);
+}
+
+TEST_P(DetailTest, ABaseIsThereAgainOnceTheRestIsDropped) {
+  const auto runtime = lit_runtime();
+  for (const CellEntry& c : asset_.manifest.cells) {
+    ASSERT_EQ(runtime->load_part(asset_, c.chunk.digest, 1, false, true), LIGHTLOOM_ERROR_INVALID_ARGUMENT);
+    ASSERT_EQ(lightloom_unload_chunk(runtime->get(), c.chunk.digest.bytes.data()), LIGHTLOOM_OK);
+    ASSERT_EQ(runtime->load_part(asset_, c.chunk.digest, 1, false, true), LIGHTLOOM_OK);
+  }
+  for (const ProbeEntry& p : asset_.manifest.probes) {
+    ASSERT_EQ(lightloom_unload_chunk(runtime->get(), p.relight.digest.bytes.data()), LIGHTLOOM_OK);
+    ASSERT_EQ(runtime->load_part(asset_, p.relight.digest, 0, true, true), LIGHTLOOM_OK);
+  }
+  settle(*runtime);
+  const std::vector<Vec3> base = runtime->irradiance();
+  const uint64_t bytes = runtime->counts().gpu_bytes;
+  for (int times = 0; times < 3; ++times) {
+    load_cells(*runtime, kAll);
+    load_probes(*runtime, false);
+    settle(*runtime);
+    EXPECT_NE(runtime->irradiance(), base);
+    for (const CellEntry& c : asset_.manifest.cells) {
+      ASSERT_EQ(lightloom_drop_detail(runtime->get(), c.chunk.digest.bytes.data()), LIGHTLOOM_OK);
+    }
+    for (const ProbeEntry& p : asset_.manifest.probes) {
+      ASSERT_EQ(lightloom_drop_detail(runtime->get(), p.relight.digest.bytes.data()), LIGHTLOOM_OK);
+    }
+    EXPECT_EQ(runtime->counts().pending_bytes, 0u);
+    settle(*runtime);
+    EXPECT_LT(p999_error(runtime->irradiance(), base), 1e-5);
+  }
+  if (GetParam() == LIGHTLOOM_CREATE_CPU) {
+    EXPECT_EQ(runtime->counts().gpu_bytes, bytes);
+  }
 }
 
 TEST_P(DetailTest, AnotherModelFadesInAndLightDoesNot) {

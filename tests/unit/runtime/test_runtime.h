@@ -68,12 +68,13 @@ class TestRuntime {
     return lightloom_load(runtime_, &info);
   }
   lightloom_result load_part(const SyntheticAsset& asset, const Digest& digest, uint32_t max_rank,
-                             bool coarse_rays = false) {
+                             bool coarse_rays = false, bool base = false) {
     const std::vector<uint8_t>& bytes = asset.chunks.at(digest);
     lightloom_detail detail{};
     detail.struct_size = sizeof detail;
     detail.max_rank = max_rank;
-    detail.flags = coarse_rays ? LIGHTLOOM_DETAIL_COARSE_RAYS : 0;
+    if (coarse_rays) detail.flags |= LIGHTLOOM_DETAIL_COARSE_RAYS;
+    if (base) detail.flags |= LIGHTLOOM_DETAIL_BASE;
     return lightloom_load_chunk_part(runtime_, digest.bytes.data(), bytes.data(), bytes.size(), &detail);
   }
   void light(const SurfaceLight& l) {
