@@ -63,7 +63,6 @@ absl::StatusOr<AssetIndex> AssetIndex::create(const Manifest& m, std::pmr::memor
   AssetIndex index(memory);
   index.order_ = static_cast<uint32_t>(m.params.order);
   index.rays_ = static_cast<uint32_t>(m.params.relight_rays);
-  index.clusters_ = static_cast<uint32_t>(m.clusters.size());
   index.width_ = static_cast<uint32_t>(m.width);
   index.height_ = static_cast<uint32_t>(m.height);
   LL_RETURN_IF_ERROR(index.add_objects(m));
@@ -71,8 +70,11 @@ absl::StatusOr<AssetIndex> AssetIndex::create(const Manifest& m, std::pmr::memor
   for (const ProbeEntry& p : m.probes) index.probes_.push_back({p.position, p.relight});
   index.cells_.reserve(m.cells.size());
   for (const CellEntry& c : m.cells) {
-    index.cells_.push_back({c.chunk, c.receivers, c.clusters, c.first_probe, c.probes});
+    index.cells_.push_back(
+        {c.chunk, c.bounds, c.error, c.receivers, c.first_cluster, c.clusters, c.first_probe, c.probes});
   }
+  index.clusters_.reserve(m.clusters.size());
+  for (const ClusterEntry& c : m.clusters) index.clusters_.push_back({c.receivers, c.rank, c.probes});
   index.cell_probes_.assign(m.cell_probes.begin(), m.cell_probes.end());
   index.list_cells_of_probes();
   LL_RETURN_IF_ERROR(index.sort_digests());

@@ -32,8 +32,14 @@ class AssetIndex {
   };
   struct Cell {
     ChunkRef chunk;
-    uint32_t receivers = 0, clusters = 0;
+    Aabb bounds;  ///< of its receivers
+    float error = 0;
+    uint32_t receivers = 0;
+    uint32_t first_cluster = 0, clusters = 0;
     uint32_t first_probe = 0, probes = 0;  ///< range of cell_probes()
+  };
+  struct Cluster {
+    uint32_t receivers = 0, rank = 0, probes = 0;
   };
   enum class Kind { kSurface, kRelight, kCell };
   struct Target {
@@ -49,12 +55,15 @@ class AssetIndex {
   uint32_t order() const { return order_; }
   uint32_t rays() const { return rays_; }
   uint32_t surface_elements() const { return surface_elements_; }
-  uint32_t clusters() const { return clusters_; }
+  uint32_t clusters() const { return static_cast<uint32_t>(clusters_.size()); }
   uint32_t width() const { return width_; }
   uint32_t height() const { return height_; }
   std::span<const Object> objects() const { return objects_; }
   std::span<const Probe> probes() const { return probes_; }
   std::span<const Cell> cells() const { return cells_; }
+  std::span<const Cluster> clusters_of(uint32_t cell) const {
+    return std::span(clusters_).subspan(cells_[cell].first_cluster, cells_[cell].clusters);
+  }
   std::span<const uint32_t> cell_probes() const { return cell_probes_; }
   std::span<const uint32_t> probes_of(uint32_t cell) const {
     return cell_probes().subspan(cells_[cell].first_probe, cells_[cell].probes);
@@ -86,6 +95,7 @@ class AssetIndex {
         by_id_(memory),
         probes_(memory),
         cells_(memory),
+        clusters_(memory),
         cell_probes_(memory),
         first_cell_(memory),
         probe_cells_(memory),
@@ -98,11 +108,12 @@ class AssetIndex {
     Digest digest;
     Target target;
   };
-  uint32_t order_ = 0, rays_ = 0, surface_elements_ = 0, clusters_ = 0, width_ = 0, height_ = 0;
+  uint32_t order_ = 0, rays_ = 0, surface_elements_ = 0, width_ = 0, height_ = 0;
   std::pmr::vector<Object> objects_;
   std::pmr::vector<uint32_t> by_id_;  ///< into objects_, sorted by id
   std::pmr::vector<Probe> probes_;
   std::pmr::vector<Cell> cells_;
+  std::pmr::vector<Cluster> clusters_;
   std::pmr::vector<uint32_t> cell_probes_;
   std::pmr::vector<uint32_t> first_cell_;  ///< per probe and one more: range of probe_cells_
   std::pmr::vector<uint32_t> probe_cells_;

@@ -20,26 +20,48 @@ SurfaceKeys Backend::keys_of(uint32_t object) const {
 absl::Status Backend::load_chunk(const Digest& digest, std::span<const uint8_t> bytes, const Detail& detail) {
   LL_ASSIGN_OR_RETURN(const AssetIndex::Target target, find_chunk(index(), digest));
   if (resident(target, detail)) return absl::OkStatus();
+  LL_ASSIGN_OR_RETURN(DecodedChunk chunk, decode(digest, bytes));
+  return load(std::move(chunk), detail);
+}
+
+absl::StatusOr<DecodedChunk> Backend::decode(const Digest& digest, std::span<const uint8_t> bytes) const {
+  DecodedChunk chunk;
+  LL_ASSIGN_OR_RETURN(chunk.target, find_chunk(index(), digest));
+  const uint32_t i = chunk.target.index;
   const auto keys = [this](uint32_t object) { return keys_of(object); };
-  switch (target.kind) {
+  switch (chunk.target.kind) {
     case AssetIndex::Kind::kSurface: {
-      LL_ASSIGN_OR_RETURN(const SurfaceChunk chunk, index().surface(target.index, bytes));
-      SurfaceKeys of_object = keys_of_surface(chunk, memory_);
-      LL_RETURN_IF_ERROR(load_surface(target.index, chunk));
-      const std::lock_guard lock(keys_mutex_);
-      keys_[target.index] = std::move(of_object);
-      return absl::OkStatus();
+      LL_ASSIGN_OR_RETURN(chunk.surface, index().surface(i, bytes));
+      break;
     }
     case AssetIndex::Kind::kRelight: {
-      LL_ASSIGN_OR_RETURN(const auto rays, resolve_relight(index(), target.index, bytes, keys));
-      return load_relight(target.index, rays, detail);
+      LL_ASSIGN_OR_RETURN(chunk.rays, resolve_relight(index(), i, bytes, keys));
+      break;
     }
+    case AssetIndex::Kind::kCell: {
+      LL_ASSIGN_OR_RETURN(chunk.cell, resolve_cell(index(), i, bytes, keys));
+      break;
+    }
+  }
+  return chunk;
+}
+
+absl::Status Backend::load(DecodedChunk chunk, const Detail& detail) {
+  switch (chunk.target.kind) {
+    case AssetIndex::Kind::kSurface: {
+      SurfaceKeys keys = keys_of_surface(chunk.surface, memory_);
+      LL_RETURN_IF_ERROR(load_surface(chunk.target.index, chunk.surface));
+      const std::lock_guard lock(keys_mutex_);
+      keys_[chunk.target.index] = std::move(keys);
+      return absl::OkStatus();
+    }
+    case AssetIndex::Kind::kRelight:
+      return load_relight(chunk.target.index, chunk.rays, detail);
     case AssetIndex::Kind::kCell:
       break;
   }
-  LL_ASSIGN_OR_RETURN(SourceCell source, resolve_cell(index(), target.index, bytes, keys));
-  limit_rank(&source.chunk, detail.max_rank);
-  return load_cell(target.index, source, detail);
+  limit(&chunk.cell.chunk, detail);
+  return load_cell(chunk.target.index, chunk.cell, detail);
 }
 
 absl::Status Backend::unload_chunk(const Digest& digest) {

@@ -17,6 +17,15 @@ namespace lightloom {
 
 enum class SurfaceInput { kDirect, kAlbedo, kEmission };
 
+/// A chunk of the asset: checked, its texels resolved to surface elements.
+struct DecodedChunk {
+  AssetIndex::Target target;
+  // The one that the target is.
+  SurfaceChunk surface;
+  std::vector<uint32_t> rays;  ///< all of the set's: surface elements, RelightChunk::kDead or kSky
+  SourceCell cell;
+};
+
 /// Threads as lightloom.h says: load_chunk, unload_chunk, set, set_environment, set_options, reset_feedback, counts and
 /// stats may be called from any thread at once; the rest is alone, or on one recording thread.
 ///
@@ -37,6 +46,9 @@ class Backend {
   const AssetIndex& index() const { return *index_; }
   /// What is resident in another detail keeps to light the level until the frame that has all of the new one.
   absl::Status load_chunk(const Digest& digest, std::span<const uint8_t> bytes, const Detail& detail = {});
+  /// load_chunk() in two steps.
+  absl::StatusOr<DecodedChunk> decode(const Digest& digest, std::span<const uint8_t> bytes) const;
+  absl::Status load(DecodedChunk chunk, const Detail& detail);
   absl::Status unload_chunk(const Digest& digest);
   /// Back to the base, at once. Without a base nothing changes.
   absl::Status drop_detail(const Digest& digest);
@@ -51,6 +63,8 @@ class Backend {
   virtual absl::Status read_irradiance(std::span<float> rgb) = 0;
   virtual lightloom_counts counts() const = 0;
   virtual lightloom_stats stats() const = 0;
+  /// Loaded, but not yet part of a recorded frame.
+  virtual uint64_t pending_bytes() const = 0;
 
  protected:
   /// For load_manifest and unload; null: no asset.
@@ -61,7 +75,7 @@ class Backend {
   virtual absl::Status load_surface(uint32_t object, const SurfaceChunk& chunk) = 0;
   /// All rays of the chunk: surface elements, RelightChunk::kDead or kSky.
   virtual absl::Status load_relight(uint32_t probe, std::span<const uint32_t> rays, const Detail& detail) = 0;
-  /// Limited to the rank already.
+  /// Limited already.
   virtual absl::Status load_cell(uint32_t cell, const SourceCell& source, const Detail& detail) = 0;
   virtual void unload_target(const AssetIndex::Target& target) = 0;
   virtual void drop_target_detail(const AssetIndex::Target& target) = 0;

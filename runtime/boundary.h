@@ -29,6 +29,7 @@ inline constexpr const char* kUnknownChunk = "lightloom/unknown_chunk";
 absl::Status over_budget(const std::string& message);
 absl::Status not_ready(const std::string& message);
 absl::Status unknown_chunk(const std::string& message);
+absl::Status unreadable_chunk(const ChunkRef& ref);
 
 /// Which status stands for which result, in all of runtime/ and in core/asset.
 lightloom_result result_of(const absl::Status& status);

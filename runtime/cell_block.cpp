@@ -81,9 +81,16 @@ absl::StatusOr<CellBlock> make_cell_block(const SourceCell& cell, uint64_t max_b
   CellBlock block{at.end, at.coefficients, 0, 0, 0, 0, std::pmr::vector<uint8_t>(at.coefficients, memory)};
   uint8_t* const data = block.data.data();
   const auto units = [](uint64_t bytes, uint64_t unit) { return static_cast<uint32_t>(bytes / unit); };
-  Writer(data).put(gpu::CellHeader{units(at.clusters, sizeof(gpu::Cluster)), units(at.jobs, 4), units(at.probes, 4),
-                                   units(at.corrections, 4), units(at.octets, 4), units(at.elements, 4),
-                                   units(at.uniforms, 16), units(at.coefficients, 16)});
+  Writer(data).put(gpu::CellHeader{units(at.clusters, sizeof(gpu::Cluster)),
+                                   units(at.jobs, 4),
+                                   units(at.probes, 4),
+                                   units(at.corrections, 4),
+                                   units(at.octets, 4),
+                                   units(at.elements, 4),
+                                   units(at.uniforms, 16),
+                                   units(at.coefficients, 16),
+                                   static_cast<uint32_t>(sh_stride(static_cast<int>(cell.chunk.order))) / 8,
+                                   {}});
   Writer clusters(data + at.clusters), jobs(data + at.jobs), probes(data + at.probes);
   Writer corrections(data + at.corrections), octets(data + at.octets), elements(data + at.elements);
   Writer uniforms(data + at.uniforms), matrix(data + at.matrix);

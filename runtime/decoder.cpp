@@ -38,11 +38,12 @@ void relight(const std::vector<uint32_t>& rays, const std::vector<float>& sh, co
   }
 }
 
-/// c_0..c_K of one cluster.
+/// c_0..c_K of one cluster. `order`: of λ.
 std::vector<Rgb> project(const SourceCell& cell, const CellChunk::Cluster& cluster, uint32_t order,
                          const std::vector<Vec3>& lambda) {
   const size_t J = static_cast<size_t>(sh_count(static_cast<int>(order)));
-  const size_t stride = static_cast<size_t>(sh_stride(static_cast<int>(order)));
+  const size_t cell_J = static_cast<size_t>(sh_count(static_cast<int>(cell.chunk.order)));
+  const size_t stride = static_cast<size_t>(sh_stride(static_cast<int>(cell.chunk.order)));
   const size_t P = cluster.probes.size();
   const auto lambda_of = [&](size_t i, size_t j) { return lambda[cell.probes[cluster.probes[i]] * J + j]; };
 
@@ -54,7 +55,7 @@ std::vector<Rgb> project(const SourceCell& cell, const CellChunk::Cluster& clust
   for (size_t k = 1; k < c.size(); ++k) {
     for (size_t i = 0; i < P; ++i) {
       const Half* row = cluster.projection.data() + ((k - 1) * P + i) * stride;
-      for (size_t j = 0; j < J; ++j) add(&c[k], static_cast<double>(half_to_float(row[j])), lambda_of(i, j));
+      for (size_t j = 0; j < cell_J; ++j) add(&c[k], static_cast<double>(half_to_float(row[j])), lambda_of(i, j));
     }
     add(&c[k], -static_cast<double>(cluster.correction[k - 1]), c[0]);
   }

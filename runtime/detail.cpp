@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "core/base/sh.h"
 
@@ -16,13 +17,21 @@ double turn(double x) { return x - std::floor(x); }
 
 }  // namespace
 
-void limit_rank(CellChunk* chunk, uint32_t max_rank) {
+void limit(CellChunk* chunk, const Detail& detail) {
   const size_t stride = static_cast<size_t>(sh_stride(static_cast<int>(chunk->order)));
+  chunk->order = std::min(chunk->order, std::max(detail.bands, 1u) - 1);
+  const size_t count = static_cast<size_t>(sh_count(static_cast<int>(chunk->order)));
+  const size_t new_stride = static_cast<size_t>(sh_stride(static_cast<int>(chunk->order)));
   for (CellChunk::Cluster& c : chunk->clusters) {
-    if (c.rank() <= max_rank) continue;
-    c.correction.resize(max_rank);
-    c.projection.resize(max_rank * c.probes.size() * stride);
-    c.reconstruction.resize(max_rank * ((c.receivers + size_t{7}) / 8 * 8));
+    const size_t rank = std::min(c.rank(), detail.max_rank);
+    c.correction.resize(rank);
+    c.reconstruction.resize(rank * ((c.receivers + size_t{7}) / 8 * 8));
+    std::vector<Half> projection(rank * c.probes.size() * new_stride);
+    for (size_t row = 0; row < rank * c.probes.size(); ++row) {
+      std::copy_n(c.projection.begin() + static_cast<ptrdiff_t>(row * stride), count,
+                  projection.begin() + static_cast<ptrdiff_t>(row * new_stride));
+    }
+    c.projection = std::move(projection);
   }
 }
 

@@ -11,14 +11,15 @@ namespace lightloom {
 
 struct Detail {
   uint32_t max_rank = UINT32_MAX;  ///< of cells: columns of each cluster, at most; the uniform one is always there
+  uint32_t bands = UINT32_MAX;     ///< of cells: of the probes' harmonics, at most; at least 1
   bool all_rays = true;            ///< of relight sets; else coarse_rays()
   bool base = false;  ///< stays resident beneath what is loaded later, and lights again once that is dropped
 
   bool operator==(const Detail&) const = default;
 };
 
-/// Keeps the first `max_rank` columns of each cluster.
-void limit_rank(CellChunk* chunk, uint32_t max_rank);
+/// Keeps the first columns of each cluster, and of their projection the first bands. `order` is then the lower one.
+void limit(CellChunk* chunk, const Detail& detail);
 
 /// Which of N relight rays stand for all when they are far away: about 256, one of each run of as many successive rays
 /// (a band of equal area), the one nearest to a golden spiral of so few points. All, if N is not much more.

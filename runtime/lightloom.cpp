@@ -67,7 +67,7 @@ struct Loader {
     LL_RETURN_IF_ERROR(check_chunk_size(ref));
     bytes.resize(ref.size);
     if (info->read_chunk(info->read_user, ref.digest.bytes.data(), ref.size, bytes.data()) != 0) {
-      return absl::AbortedError("chunk " + ref.digest.hex() + " could not be read; is the asset complete?");
+      return unreadable_chunk(ref);
     }
     return backend->load_chunk(ref.digest, bytes);
   }
@@ -82,6 +82,9 @@ struct Loader {
 
 }  // namespace
 
+absl::Status unreadable_chunk(const ChunkRef& ref) {
+  return absl::AbortedError("chunk " + ref.digest.hex() + " could not be read; is the asset complete?");
+}
 absl::Status over_budget(const std::string& message) {
   return marked(absl::ResourceExhaustedError(message), kOverBudget);
 }
@@ -193,13 +196,14 @@ lightloom_result lightloom_load_chunk_part(lightloom_runtime* runtime, const uin
                                            uint64_t size, const lightloom_detail* detail) {
   return with_asset(runtime, [&](Backend& backend) -> absl::Status {
     if (digest == nullptr || bytes == nullptr) return absl::InvalidArgumentError("the digest or the chunk is null");
-    if (detail == nullptr || detail->struct_size < sizeof *detail || detail->reserved != 0 ||
+    if (detail == nullptr || detail->struct_size < sizeof *detail ||
         (detail->flags & ~uint32_t{LIGHTLOOM_DETAIL_COARSE_RAYS | LIGHTLOOM_DETAIL_BASE}) != 0) {
       return absl::InvalidArgumentError("lightloom_detail is null, its struct_size is wrong or a flag is unknown");
     }
-    return backend.load_chunk(lightloom::digest_of(digest), {static_cast<const uint8_t*>(bytes), size},
-                              {detail->max_rank, (detail->flags & LIGHTLOOM_DETAIL_COARSE_RAYS) == 0,
-                               (detail->flags & LIGHTLOOM_DETAIL_BASE) != 0});
+    return backend.load_chunk(
+        lightloom::digest_of(digest), {static_cast<const uint8_t*>(bytes), size},
+        {detail->max_rank, detail->bands == 0 ? UINT32_MAX : detail->bands,
+         (detail->flags & LIGHTLOOM_DETAIL_COARSE_RAYS) == 0, (detail->flags & LIGHTLOOM_DETAIL_BASE) != 0});
   });
 }
 

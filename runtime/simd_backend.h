@@ -33,6 +33,7 @@ class SimdBackend final : public Backend {
   absl::Status read_irradiance(std::span<float> rgb) override;
   lightloom_counts counts() const override;
   lightloom_stats stats() const override;
+  uint64_t pending_bytes() const override { return 0; }
 
  protected:
   bool resident(const AssetIndex::Target& target, const Detail& detail) const override;

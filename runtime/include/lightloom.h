@@ -134,7 +134,7 @@ typedef struct lightloom_detail {
   uint32_t struct_size;
   uint32_t flags;    /* LIGHTLOOM_DETAIL_* */
   uint32_t max_rank; /* cells: coefficients per cluster at most, besides the uniform one */
-  uint32_t reserved; /* 0 */
+  uint32_t bands;    /* cells: of the probes' spherical harmonics, at most; 0: all */
 } lightloom_detail;
 
 enum {
@@ -190,6 +190,66 @@ typedef struct lightloom_counts {
 } lightloom_counts;
 
 LIGHTLOOM_API lightloom_result lightloom_get_counts(lightloom_runtime* runtime, lightloom_counts* counts);
+
+/* ---- Streaming ------------------------------------------------------------------------------------------- */
+
+/* Keeps resident what the camera needs most. First a coarse base of every cell and probe, near ones first: nothing is
+ * black, and the light that bounces keeps its energy. Then details, by how much is seen of them per byte, from where the
+ * camera is and where it will be; what is worth least is dropped for it. Use it in place of lightloom_load_chunk. */
+typedef struct lightloom_stream lightloom_stream;
+
+enum {
+  LIGHTLOOM_STREAM_NO_THREAD = 1u << 0 /* no thread of ours: call lightloom_stream_work on one of yours */
+};
+
+typedef struct lightloom_stream_info {
+  uint32_t struct_size;
+  uint32_t flags;                     /* LIGHTLOOM_STREAM_* */
+  lightloom_read_chunk_fn read_chunk; /* called on the streaming thread; a chunk that cannot be read is tried again */
+  void* read_user;
+  uint64_t byte_budget; /* device memory of cells and relight sets, about; 0: none but the runtime's own */
+  uint64_t queue_bytes; /* nothing is read while more than this waits to be uploaded; 0: 8 MiB */
+} lightloom_stream_info;
+
+/* A manifest must be loaded, and not be replaced before the stream is destroyed. *out is null on failure. */
+LIGHTLOOM_API lightloom_result lightloom_stream_create(lightloom_runtime* runtime, const lightloom_stream_info* info,
+                                                       lightloom_stream** out);
+/* Waits for a read that is going on. What is resident stays. Null is fine. */
+LIGHTLOOM_API void lightloom_stream_destroy(lightloom_stream* stream);
+
+typedef struct lightloom_stream_view {
+  uint32_t struct_size;
+  uint32_t reserved; /* 0 */
+  float position[3]; /* of the camera, metres */
+  float velocity[3]; /* m/s */
+} lightloom_stream_view;
+
+/* Each frame, from any thread: where the camera is. It costs next to nothing; the work is done elsewhere. */
+LIGHTLOOM_API lightloom_result lightloom_stream_set_view(lightloom_stream* stream, const lightloom_stream_view* view);
+
+/* Cells that touch one of `count` boxes are kept in full detail before all others; lo and hi: 3 floats of each. Replaces
+ * the boxes of before. */
+LIGHTLOOM_API lightloom_result lightloom_stream_pin(lightloom_stream* stream, const float* lo, const float* hi,
+                                                    uint32_t count);
+
+/* With NO_THREAD: does a piece of work, reading about `bytes`. *more is 0 if nothing is left until the next view; may be
+ * null. One thread at a time. */
+LIGHTLOOM_API lightloom_result lightloom_stream_work(lightloom_stream* stream, uint64_t bytes, uint32_t* more);
+
+typedef struct lightloom_stream_state {
+  uint32_t struct_size;                       /* in: sizeof; the fields that fit are filled */
+  uint32_t done;                              /* 1: all that the view needs and the budget holds is there */
+  uint32_t base_cells, some_cells, all_cells; /* resident at exactly that level */
+  uint32_t base_probes, all_probes;
+  uint32_t failing;                        /* chunks that could not be read, and are tried again later */
+  uint64_t bytes;                          /* that cells and relight sets take, about */
+  uint64_t read_bytes, read_chunks, drops; /* so far */
+} lightloom_stream_state;
+
+LIGHTLOOM_API lightloom_result lightloom_stream_get_state(lightloom_stream* stream, lightloom_stream_state* state);
+
+/* For display: per cell of the manifest 0 (nothing), 1 (base), 2 (some columns) or 3 (all). */
+LIGHTLOOM_API lightloom_result lightloom_stream_get_levels(lightloom_stream* stream, uint8_t* levels, uint32_t cells);
 
 /* ---- What the surfaces are like -------------------------------------------------------------------------- */
 

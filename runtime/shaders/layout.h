@@ -91,6 +91,8 @@ struct CellHeader {
   uint clusters;                                     // in units of Cluster
   uint jobs, probes, corrections, octets, elements;  // words
   uint uniforms, coefficients;                       // quads
+  uint stride8;                                      // of a probe's halfs in a row of the matrix, in eights
+  uint unused[7];
 };
 /// Quads are counted from the start of the block.
 struct Cluster {
@@ -164,7 +166,7 @@ struct SelectCellsPush {
   uint cells, max_cells, image_groups, max_groups;
 };
 struct ProjectPush {
-  uint stride8;  // sh_stride / 8
+  uint stride8;  // of λ: sh_stride / 8
   uint pool;
 };
 struct ReceivePush {
@@ -183,7 +185,7 @@ struct ImagePush {
 };
 
 #ifdef __cplusplus
-static_assert(sizeof(Cluster) == kCellUnit && sizeof(CellHeader) == kCellUnit && sizeof(Cell) == 48);
+static_assert(sizeof(Cluster) == kCellUnit && sizeof(CellHeader) % kCellUnit == 0 && sizeof(Cell) == 48);
 static_assert(sizeof(Light) == 64 && sizeof(ShadowView) == 80 && sizeof(Control) % 16 == 0);
 }  // namespace lightloom::gpu
 #undef LL_CONSTANT

@@ -51,7 +51,8 @@ void main() {
   const uint corrections = word + words[word + 3] + cluster.first_correction;
   const uint coefficient = quad + words[word + 7] + cluster.first_coefficient;
   const uint columns = min(kJobColumns, cluster.rank - first);
-  const uint row = cluster.probes * push.stride8;
+  const uint stride8 = words[word + 8];  // no more bands than λ has
+  const uint row = cluster.probes * stride8;
   const uint stride4 = 2 * push.stride8;
 
   // Without a branch in the middle: where the job has fewer columns the last one is read again.
@@ -59,8 +60,8 @@ void main() {
   [[unroll]] for (uint k = 0; k < kJobColumns; ++k) column[k] = vec3(0.0);
   const uint matrix_at = quad + cluster.projection + first * row;
   for (uint e = local; columns > 0 && e < row; e += kGroup) {
-    const uint i = e / push.stride8;
-    const uint at = words[probes + i] * 3 * stride4 + 2 * (e - i * push.stride8);
+    const uint i = e / stride8;
+    const uint at = words[probes + i] * 3 * stride4 + 2 * (e - i * stride8);
     const vec4 r0 = lambda[at], r1 = lambda[at + 1];
     const vec4 g0 = lambda[at + stride4], g1 = lambda[at + stride4 + 1];
     const vec4 b0 = lambda[at + 2 * stride4], b1 = lambda[at + 2 * stride4 + 1];

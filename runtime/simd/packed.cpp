@@ -47,9 +47,12 @@ void pack_receivers(const SourceCell& cell, const CellChunk::Cluster& c, const P
 
 }  // namespace
 
-PackedCell pack_cell(const SourceCell& cell, std::pmr::memory_resource* memory) {
+PackedCell pack_cell(const SourceCell& cell, bool full_bands, std::pmr::memory_resource* memory) {
   PackedCell packed;
-  packed.stride = static_cast<uint32_t>(sh_stride(static_cast<int>(cell.chunk.order)));
+  // Kernels read a row in vectors. Where one reaches behind the last band, λ must be 0; with fewer bands than λ has, the
+  // row is.
+  const uint32_t stride = static_cast<uint32_t>(sh_stride(static_cast<int>(cell.chunk.order)));
+  packed.stride = full_bands ? stride : (stride + kLambdaAlign - 1) / kLambdaAlign * kLambdaAlign;
   packed.clusters = Array<PackedCluster>(memory, cell.chunk.clusters.size());
 
   // Where each cluster's part begins, and how long the arrays become.
@@ -62,7 +65,7 @@ PackedCell pack_cell(const SourceCell& cell, std::pmr::memory_resource* memory) 
     to.rank = c.rank();
     to.receivers = c.receivers;
     to.padded = (c.receivers + kReceiverAlign - 1) / kReceiverAlign * kReceiverAlign;
-    end.projection += c.projection.size();
+    end.projection += c.projection.size() / stride * packed.stride;
     end.reconstruction += size_t{to.rank} * to.padded;
     end.probes += to.probe_count;
     end.correction += to.rank;
@@ -81,7 +84,10 @@ PackedCell pack_cell(const SourceCell& cell, std::pmr::memory_resource* memory) 
   for (size_t i = 0; i < cell.chunk.clusters.size(); ++i) {
     const CellChunk::Cluster& c = cell.chunk.clusters[i];
     const PackedCluster& to = packed.clusters[i];
-    std::copy(c.projection.begin(), c.projection.end(), packed.projection.data() + to.projection);
+    for (size_t row = 0; row < c.projection.size() / stride; ++row) {
+      std::copy_n(c.projection.begin() + static_cast<ptrdiff_t>(row * stride), stride,
+                  packed.projection.data() + to.projection + row * packed.stride);
+    }
     packed.reconstruction_bytes += c.reconstruction.size() * sizeof(Half);
     std::copy(c.correction.begin(), c.correction.end(), packed.correction.data() + to.correction);
     for (size_t p = 0; p < c.probes.size(); ++p) packed.probes[to.probes + p] = cell.probes[c.probes[p]];

@@ -48,8 +48,8 @@ inline uint32_t sky_element(uint32_t surface_elements) { return dead_element(sur
 /// Words of a set of tiles.
 inline uint32_t tile_words(uint32_t surface_elements) { return (tiles_of(surface_elements) + 63) / 64; }
 
-/// REQUIRES: the cell and the rays are AssetSource's.
-PackedCell pack_cell(const SourceCell& cell, std::pmr::memory_resource* memory);
+/// REQUIRES: the cell and the rays are AssetSource's. `full_bands`: the cell has as many as λ.
+PackedCell pack_cell(const SourceCell& cell, bool full_bands, std::pmr::memory_resource* memory);
 PackedProbe pack_probe(std::span<const uint32_t> rays, uint32_t surface_elements, std::pmr::memory_resource* memory);
 
 }  // namespace lightloom::simd

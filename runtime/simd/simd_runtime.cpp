@@ -20,6 +20,7 @@ SimdRuntime::SimdRuntime(const AssetIndex& index, const SimdOptions& options)
       kernels_(options.kernels != nullptr ? options.kernels : &simd::best_kernels()),
       milliseconds_(options.milliseconds != nullptr ? options.milliseconds : steady_milliseconds),
       smoothing_(options.smoothing),
+      order_(index.order()),
       pool_(options.threads),
       surface_(memory_, index.surface_elements(), options.smoothing),
       probes_(memory_, index),

@@ -58,9 +58,11 @@ class SimdRuntime {
   /// Nothing is resident, all inputs and E are 0. Keeps a reference to the index.
   SimdRuntime(const AssetIndex& index, const SimdOptions& options);
 
-  /// REQUIRES: the cell and the rays are AssetSource's, of the same manifest; or what limit_rank() and coarse_rays() left
+  /// REQUIRES: the cell and the rays are AssetSource's, of the same manifest; or what limit() and coarse_rays() left
   /// of them.
-  simd::PackedCell pack_cell(const SourceCell& cell) const { return simd::pack_cell(cell, memory_); }
+  simd::PackedCell pack_cell(const SourceCell& cell) const {
+    return simd::pack_cell(cell, cell.chunk.order == order_, memory_);
+  }
   simd::PackedProbe pack_probe(std::span<const uint32_t> rays) const {
     return simd::pack_probe(rays, surface_.elements(), memory_);
   }
@@ -104,6 +106,7 @@ class SimdRuntime {
   const simd::Kernels* kernels_;
   double (*milliseconds_)();
   bool smoothing_;
+  uint32_t order_;
   mutable std::mutex mutex_;  ///< guards everything below
   simd::WorkerPool pool_;
   simd::Surface surface_;

@@ -416,14 +416,22 @@ bool VulkanAsset::tables_pending() const {
          std::any_of(inputs_.begin(), inputs_.end(), [](const auto& t) { return t.pending_bytes() > 0; });
 }
 
+uint64_t VulkanAsset::pending_bytes() const {
+  const std::lock_guard lock(mutex_);
+  uint64_t bytes = uploads_.pending_bytes();
+  for (const ShadowTable& t : inputs_) bytes += t.pending_bytes();
+  return bytes;
+}
+
 bool VulkanAsset::uploads_pending() const {
   const std::lock_guard lock(mutex_);
   return !uploads_.empty() || tables_pending();
 }
 
 void VulkanAsset::fill_counts(lightloom_counts* out) const {
-  const std::lock_guard lock(mutex_);
   *out = counts_of(index_);
+  out->pending_bytes = pending_bytes();
+  const std::lock_guard lock(mutex_);
   for (const bool resident : surfaces_) out->resident_surfaces += resident;
   for (const Probe& p : probes_) out->resident_probes += p.newest() != nullptr;
   for (const Cell& c : cells_) {
@@ -431,8 +439,6 @@ void VulkanAsset::fill_counts(lightloom_counts* out) const {
     out->active_cells += c.record.live != 0;
   }
   out->pages = cell_pools_->count();
-  out->pending_bytes = uploads_.pending_bytes();
-  for (const ShadowTable& t : inputs_) out->pending_bytes += t.pending_bytes();
   out->gpu_bytes = context_->bytes;
   out->byte_budget = context_->budget;
 }

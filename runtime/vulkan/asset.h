@@ -54,6 +54,7 @@ class VulkanAsset {
   void set_environment(Vec3 radiance);
   void set_options(const lightloom_update_options& options);
   void reset_feedback();
+  uint64_t pending_bytes() const;
   bool uploads_pending() const;  ///< anything that the device does not have yet
 
   /// Records one frame. `frame` counts from 1.

@@ -28,6 +28,7 @@ class VulkanBackend final : public Backend {
   absl::Status read_irradiance(std::span<float> rgb) override;
   lightloom_counts counts() const override;
   lightloom_stats stats() const override;
+  uint64_t pending_bytes() const override { return asset_->pending_bytes(); }
 
   // REQUIRES: loaded().
   absl::Status record(VkCommandBuffer commands, const lightloom_frame_info& info, FrameKind kind = FrameKind::kWhole);

@@ -74,9 +74,9 @@ class DetailTest : public ::testing::TestWithParam<uint32_t> {
     }
     FAIL() << "still working";
   }
-  void load_cells(TestRuntime& runtime, uint32_t max_rank) const {
+  void load_cells(TestRuntime& runtime, uint32_t max_rank, uint32_t bands = 0) const {
     for (const CellEntry& c : asset_.manifest.cells) {
-      ASSERT_EQ(runtime.load_part(asset_, c.chunk.digest, max_rank), LIGHTLOOM_OK);
+      ASSERT_EQ(runtime.load_part(asset_, c.chunk.digest, max_rank, false, false, bands), LIGHTLOOM_OK);
     }
   }
   void load_probes(TestRuntime& runtime, bool coarse) const {
@@ -84,10 +84,10 @@ class DetailTest : public ::testing::TestWithParam<uint32_t> {
       ASSERT_EQ(runtime.load_part(asset_, p.relight.digest, 0, coarse), LIGHTLOOM_OK);
     }
   }
-  /// Eight bounces of cells that are cut to `max_rank`.
-  std::vector<Vec3> decoded(uint32_t max_rank) const {
+  /// Eight bounces of cells that are cut.
+  std::vector<Vec3> decoded(uint32_t max_rank, uint32_t bands) const {
     DecoderAsset decoder = *load_decoder_asset(*source_);
-    for (SourceCell& c : decoder.cells) limit_rank(&c.chunk, max_rank);
+    for (SourceCell& c : decoder.cells) limit(&c.chunk, {max_rank, bands});
     std::vector<Vec3> e(decoder.surface_elements);
     for (int bounce = 0; bounce < 8; ++bounce) e = decode_frame(decoder, light_, e).irradiance;
     return e;
@@ -98,14 +98,17 @@ class DetailTest : public ::testing::TestWithParam<uint32_t> {
   SurfaceLight light_;
 };
 
-TEST_P(DetailTest, FewColumnsAreThoseOfTheDecoder) {
+TEST_P(DetailTest, FewColumnsAndBandsAreThoseOfTheDecoder) {
   const auto runtime = lit_runtime();
   const uint64_t all_bytes = runtime->counts().gpu_bytes;
-  for (const uint32_t max_rank : {0u, 1u, 5u, kAll}) {
-    load_cells(*runtime, max_rank);
+  struct {
+    uint32_t max_rank, bands;
+  } details[] = {{0, kAll}, {1, kAll}, {5, kAll}, {kAll, 1}, {7, 2}, {3, 3}, {kAll, 3}, {kAll, kAll}};
+  for (const auto& d : details) {
+    load_cells(*runtime, d.max_rank, d.bands);
     ASSERT_EQ(lightloom_reset_feedback(runtime->get()), LIGHTLOOM_OK);
     ASSERT_EQ(lightloom_update(runtime->get(), 8), LIGHTLOOM_OK);
-    EXPECT_LT(p999_error(runtime->irradiance(), decoded(max_rank)), 1e-4) << max_rank;
+    EXPECT_LT(p999_error(runtime->irradiance(), decoded(d.max_rank, d.bands)), 1e-4) << d.max_rank << ' ' << d.bands;
   }
   // Device memory comes in pages.
   if (GetParam() == LIGHTLOOM_CREATE_CPU) {

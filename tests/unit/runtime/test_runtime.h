@@ -68,11 +68,12 @@ class TestRuntime {
     return lightloom_load(runtime_, &info);
   }
   lightloom_result load_part(const SyntheticAsset& asset, const Digest& digest, uint32_t max_rank,
-                             bool coarse_rays = false, bool base = false) {
+                             bool coarse_rays = false, bool base = false, uint32_t bands = 0) {
     const std::vector<uint8_t>& bytes = asset.chunks.at(digest);
     lightloom_detail detail{};
     detail.struct_size = sizeof detail;
     detail.max_rank = max_rank;
+    detail.bands = bands == UINT32_MAX ? 0 : bands;
     if (coarse_rays) detail.flags |= LIGHTLOOM_DETAIL_COARSE_RAYS;
     if (base) detail.flags |= LIGHTLOOM_DETAIL_BASE;
     return lightloom_load_chunk_part(runtime_, digest.bytes.data(), bytes.data(), bytes.size(), &detail);
