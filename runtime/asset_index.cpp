@@ -71,7 +71,7 @@ absl::StatusOr<AssetIndex> AssetIndex::create(const Manifest& m, std::pmr::memor
   index.cells_.reserve(m.cells.size());
   for (const CellEntry& c : m.cells) {
     index.cells_.push_back(
-        {c.chunk, c.bounds, c.error, c.receivers, c.first_cluster, c.clusters, c.first_probe, c.probes});
+        {c.chunk, c.level, c.cell, c.bounds, c.receivers, c.first_cluster, c.clusters, c.first_probe, c.probes});
   }
   index.clusters_.reserve(m.clusters.size());
   for (const ClusterEntry& c : m.clusters) index.clusters_.push_back({c.receivers, c.rank, c.probes});

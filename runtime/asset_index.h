@@ -32,8 +32,9 @@ class AssetIndex {
   };
   struct Cell {
     ChunkRef chunk;
+    int32_t level = 0;  ///< of the octree: it covers [i, i+1)·2^level metres on each axis
+    GridCell place{};
     Aabb bounds;  ///< of its receivers
-    float error = 0;
     uint32_t receivers = 0;
     uint32_t first_cluster = 0, clusters = 0;
     uint32_t first_probe = 0, probes = 0;  ///< range of cell_probes()

@@ -351,6 +351,7 @@ typedef struct lightloom_stats {
   uint32_t skipped;                       /* 1: nothing had changed, no pass ran */
   /* Asset bytes that the passes of the last finished frame read. */
   uint64_t relight_bytes, project_bytes, receive_bytes;
+  uint64_t upload_bytes; /* of chunks that the last recorded frame copies */
 } lightloom_stats;
 
 LIGHTLOOM_API lightloom_result lightloom_get_stats(lightloom_runtime* runtime, lightloom_stats* stats);

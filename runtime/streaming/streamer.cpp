@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "core/base/overlap.h"
 #include "runtime/boundary.h"
 
 namespace lightloom {
@@ -17,19 +18,12 @@ struct Ahead {
 };
 constexpr Ahead kAhead[] = {{0, 1}, {0.5f, 0.5f}, {1, 0.25f}};
 /// What was important is still a bit, less with each view: about the least recently needed goes first.
-constexpr float kRecent = 0.3f, kForget = 0.98f;
+constexpr float kRecent = 0.1f, kForget = 0.95f;
 constexpr float kPinned = 1000;
 /// Views without success after which a backend without room is taken at its word.
 constexpr uint64_t kPatience = 30;
 /// Bases that are loaded between two looks.
 constexpr uint32_t kSights = 64;
-
-bool touch(const Aabb& a, const Aabb& b) {
-  for (int i = 0; i < 3; ++i) {
-    if (a.lo[i] > b.hi[i] || b.lo[i] > a.hi[i]) return false;
-  }
-  return true;
-}
 
 constexpr uint8_t kBase = 1;
 static_assert(static_cast<uint8_t>(CellLevel::kBase) == kBase && static_cast<uint8_t>(ProbeLevel::kBase) == kBase);
@@ -105,7 +99,8 @@ void Streamer::look() {
   for (uint32_t c = 0; c < seen.size(); ++c) {
     importance_[c] = std::max(importance_[c], kRecent * seen[c]);
     seen[c] = std::max(seen[c], importance_[c]);
-    if (std::any_of(pins.begin(), pins.end(), [&](const Aabb& box) { return touch(box, index_.cells()[c].bounds); })) {
+    if (std::any_of(pins.begin(), pins.end(),
+                    [&](const Aabb& box) { return overlaps(box, index_.cells()[c].bounds); })) {
       seen[c] += kPinned;
     }
   }
@@ -113,7 +108,7 @@ void Streamer::look() {
             [&](uint32_t a, uint32_t b) { return seen[a] != seen[b] ? seen[a] > seen[b] : a < b; });
   steps_ = rank_steps(index_, costs_, seen, now_);
   want_ = choose_levels(index_, costs_, steps_, budget_);
-  next_base_ = next_step_ = 0;
+  next_surface_ = next_base_ = next_step_ = 0;
 }
 
 const ChunkRef& Streamer::ref_of(const AssetIndex::Target& target) const {
@@ -246,24 +241,21 @@ Streamer::Progress Streamer::load(const Wish& wish) {
     status = read_(ref, chunk_);
   }
   absl::StatusOr<DecodedChunk> chunk = status.ok() ? backend_->decode(ref.digest, chunk_) : status;
-  if (!chunk.ok()) return failed(wish, chunk.status());
+  if (!chunk.ok()) return put_off(wish.target, chunk.status());
   {
     const std::lock_guard lock(mutex_);
     ++state_.read_chunks;
     state_.read_bytes += ref.size;
   }
+  if (wish.target.kind == AssetIndex::Kind::kSurface) sight_.add_surface(wish.target.index, chunk->surface.positions);
   if (wish.level == kBase && wish.target.kind == AssetIndex::Kind::kRelight) {
     sight_.add_probe(wish.target.index, chunk->rays);
-    ++unseen_;
-  }
-  if (wish.level == kBase && wish.target.kind == AssetIndex::Kind::kCell) {
-    sight_.add_cell(wish.target.index, chunk->cell.elements);
     ++unseen_;
   }
   const Detail detail = wish.target.kind == AssetIndex::Kind::kCell ? detail_of(static_cast<CellLevel>(wish.level))
                                                                     : detail_of(static_cast<ProbeLevel>(wish.level));
   status = backend_->load(*std::move(chunk), detail);
-  if (!status.ok()) return failed(wish, status);
+  if (!status.ok()) return no_room(wish.target, status);
   set_level(wish.target, wish.level);
   no_room_since_.reset();
   note_failure(wish.target, {});
@@ -277,26 +269,31 @@ void Streamer::note_failure(const AssetIndex::Target& target, Failure failure) {
   noted = failure;
 }
 
-Streamer::Progress Streamer::failed(const Wish& wish, const absl::Status& status) {
+Streamer::Progress Streamer::no_room(const AssetIndex::Target& target, const absl::Status& status) {
   switch (result_of(status)) {
     case LIGHTLOOM_ERROR_NOT_READY:
       return Progress::kWait;
     case LIGHTLOOM_ERROR_OVER_BUDGET:
     case LIGHTLOOM_ERROR_OUT_OF_MEMORY:
-      // What was dropped is free some frames later.
-      if (!no_room_since_) no_room_since_ = seen_view_;
-      if (seen_view_ - *no_room_since_ > kPatience) {
-        no_room_since_.reset();
-        budget_ = state_.bytes;
-        unseen_ = kSights;
-      }
-      return Progress::kWait;
-    default:
       break;
+    default:
+      return put_off(target, status);
   }
-  const uint32_t times = failures_[number_of(wish.target)].times + 1;
-  if (times == 1 && options_.report) options_.report(status);
-  note_failure(wish.target, {times, seen_view_ + (uint64_t{16} << std::min(times, 10u))});
+  // What was dropped is free some frames later. If that does not help, this is all there is.
+  if (!no_room_since_) no_room_since_ = seen_view_;
+  if (seen_view_ - *no_room_since_ > kPatience) {
+    no_room_since_.reset();
+    budget_ = state_.bytes;
+    unseen_ = kSights;
+  }
+  return Progress::kWait;
+}
+
+/// Others go on meanwhile. A chunk whose objects' surfaces could not be read has nothing to report of its own.
+Streamer::Progress Streamer::put_off(const AssetIndex::Target& target, const absl::Status& status) {
+  const uint32_t times = failures_[number_of(target)].times + 1;
+  if (times == 1 && options_.report && result_of(status) != LIGHTLOOM_ERROR_NOT_READY) options_.report(status);
+  note_failure(target, {times, seen_view_ + (uint64_t{16} << std::min(times, 10u))});
   return Progress::kStep;
 }
 

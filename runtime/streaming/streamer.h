@@ -76,7 +76,8 @@ class Streamer {
   bool make_room(uint64_t bytes);
   void drop(const AssetIndex::Target& target);
   Progress load(const Wish& wish);
-  Progress failed(const Wish& wish, const absl::Status& status);
+  Progress no_room(const AssetIndex::Target& target, const absl::Status& status);
+  Progress put_off(const AssetIndex::Target& target, const absl::Status& status);
   void note_failure(const AssetIndex::Target& target, Failure failure);
   bool waits(const AssetIndex::Target& target) const;
   size_t number_of(const AssetIndex::Target& target) const;

@@ -445,6 +445,7 @@ void VulkanAsset::fill_counts(lightloom_counts* out) const {
 
 void VulkanAsset::fill_stats(lightloom_stats* out) const {
   const std::lock_guard lock(mutex_);
+  out->upload_bytes = chunk_bytes_;
   if (skipped_frame_ > last_frame_) {
     out->skipped = 1;
     return;

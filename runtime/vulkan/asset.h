@@ -180,6 +180,7 @@ class VulkanAsset {
   bool reset_ = false;        ///< E is to be set to 0
   bool image_stale_ = true;   ///< all of the image is to be written
   bool smooth_ = false;       ///< targets hold what E goes towards
+  uint64_t chunk_bytes_ = 0;         ///< that the newest frame copies
   uint32_t fade_frames_ = 0;  ///< that are left until a change of the model has arrived
   bool sky_changed_ = true;
   bool direct_overwritten_ = false;  ///< the direct pass wrote where the host's values were

@@ -109,6 +109,7 @@ absl::Status VulkanAsset::record(VkCommandBuffer commands, const lightloom_frame
     return absl::InvalidArgumentError("direct_buffer is null or direct_offset is not aligned");
   }
   recorded_ = frame;
+  chunk_bytes_ = 0;
   free_graves(frame);
   if (kind == FrameKind::kUploads) {
     barrier_before(*context_, commands);
@@ -183,7 +184,9 @@ absl::Status VulkanAsset::record_uploads(VkCommandBuffer commands, uint32_t fram
   for (ShadowTable& t : inputs_) t.record(commands, &staging, staging.room() - std::min(staging.room(), all / 4));
   const uint64_t limit = settings_.options.upload_bytes == 0 ? UINT64_MAX : settings_.options.upload_bytes;
   const uint64_t chunks = std::min(staging.room() - staging.room() / 4, limit);
+  const uint64_t before = staging.used();
   uploads_.record(commands, *context_, &staging, chunks, [this](AssetIndex::Target t) { uploaded(t); });
+  chunk_bytes_ = staging.used() - before;
   slot_table_.record(commands, &staging, staging.room());
   cell_table_.record(commands, &staging, staging.room());
   map_table_.record(commands, &staging, staging.room());

@@ -1,30 +1,41 @@
-// A flight through the gallery with a quarter of its asset in memory.
+// A flight through the gallery with a part of its asset in memory (docs/results.md, "Streaming").
 #include <gtest/gtest.h>
 #include <lightloom.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <numeric>
 
 #include "core/scene/builtin.h"
-#include "runtime/asset_source.h"
-#include "runtime/simd/simd_runtime.h"
-#include "runtime/detail.h"
 #include "tests/support/baked_level.h"
+#include "tests/unit/runtime/test_engine.h"
 
 namespace lightloom {
 namespace {
 
 using test::value_or_die;
 
-constexpr float kFrame = 1.0f / 60;  // seconds
-
 /// The gallery, baked and lit once for all tests.
 struct Gallery {
   std::unique_ptr<test::BakedLevel> level;
   SurfaceInputs inputs;
   std::vector<uint8_t> manifest;
-  uint64_t asset_bytes = 0;  ///< of all chunks
+  uint64_t asset_bytes = 0;      ///< of all chunks
+  std::vector<Vec3> irradiance;  ///< with all of it resident
+
+  static int read_chunk(void* user, const uint8_t digest[32], uint64_t size, void* out) {
+    ChunkRef ref;
+    std::copy(digest, digest + 32, ref.digest.bytes.begin());
+    ref.size = size;
+    const auto bytes = static_cast<const ChunkStore*>(user)->get(ref);
+    if (!bytes.ok()) return 1;
+    std::copy(bytes->begin(), bytes->end(), static_cast<uint8_t*>(out));
+    return 0;
+  }
+  SurfaceLight light() const { return {inputs.direct, inputs.albedo, inputs.emission, level->scene->environment}; }
 };
+
 const Gallery& gallery() {
   static const Gallery* const it = [] {
     auto* g = new Gallery;
@@ -32,78 +43,37 @@ const Gallery& gallery() {
     g->inputs = value_or_die(light_surfaces(*g->level->tracer, g->level->elements, 4, {}));
     g->manifest = encode_manifest(g->level->manifest);
     for (const ChunkRef& ref : chunks_of(g->level->manifest)) g->asset_bytes += ref.size;
+    g->irradiance = test::light(*g->level, 40, test::Device::kSimd);
     return g;
   }();
   return *it;
 }
 
-int read_chunk(void* user, const uint8_t digest[32], uint64_t size, void* out) {
-  ChunkRef ref;
-  std::copy(digest, digest + 32, ref.digest.bytes.begin());
-  ref.size = size;
-  const auto bytes = static_cast<const ChunkStore*>(user)->get(ref);
-  if (!bytes.ok()) return 1;
-  std::copy(bytes->begin(), bytes->end(), static_cast<uint8_t*>(out));
-  return 0;
-}
-
-/// A runtime with the gallery's manifest and light.
-class Lit {
+/// A stream of the gallery that works when it is told to.
+class Stream {
  public:
-  explicit Lit(uint32_t flags, uint64_t byte_budget = 0, uint64_t page_bytes = 0) : store_(chunk_store(gallery().level->loom())) {
-    lightloom_create_info info{};
-    info.struct_size = sizeof info;
-    info.flags = flags | LIGHTLOOM_CREATE_SMOOTHING;
-    info.byte_budget = byte_budget;
-    info.page_bytes = page_bytes;
-    info.message = [](void* user, lightloom_message_kind, const char* text) {
-      static_cast<std::vector<std::string>*>(user)->emplace_back(text);
-    };
-    info.message_user = &messages_;
-    EXPECT_EQ(lightloom_create(&info, &runtime_), LIGHTLOOM_OK);
-    EXPECT_EQ(lightloom_load_manifest(runtime_, gallery().manifest.data(), gallery().manifest.size()), LIGHTLOOM_OK);
-    const SurfaceInputs& in = gallery().inputs;
-    EXPECT_EQ(lightloom_set_direct(runtime_, &in.direct[0].x, 0, in.direct.size()), LIGHTLOOM_OK);
-    EXPECT_EQ(lightloom_set_albedo(runtime_, &in.albedo[0].x, 0, in.direct.size()), LIGHTLOOM_OK);
-    EXPECT_EQ(lightloom_set_emission(runtime_, &in.emission[0].x, 0, in.direct.size()), LIGHTLOOM_OK);
-    EXPECT_EQ(lightloom_set_environment(runtime_, &gallery().level->scene->environment.x), LIGHTLOOM_OK);
-  }
-  ~Lit() {
-    lightloom_stream_destroy(stream_);
-    lightloom_destroy(runtime_);
-    EXPECT_EQ(messages_, std::vector<std::string>());
-  }
-  void load_all() {
-    lightloom_asset_info info{};
-    info.struct_size = sizeof info;
-    info.manifest = gallery().manifest.data();
-    info.manifest_bytes = gallery().manifest.size();
-    info.read_chunk = read_chunk;
-    info.read_user = &store_;
-    ASSERT_EQ(lightloom_load(runtime_, &info), LIGHTLOOM_OK);
-  }
-  void stream(uint64_t byte_budget) {
+  Stream(lightloom_runtime* runtime, double share) : store_(chunk_store(gallery().level->loom())) {
+    budget_ = static_cast<uint64_t>(share * static_cast<double>(gallery().asset_bytes));
     lightloom_stream_info info{};
     info.struct_size = sizeof info;
     info.flags = LIGHTLOOM_STREAM_NO_THREAD;
-    info.read_chunk = read_chunk;
+    info.read_chunk = Gallery::read_chunk;
     info.read_user = &store_;
-    info.byte_budget = byte_budget;
-    ASSERT_EQ(lightloom_stream_create(runtime_, &info, &stream_), LIGHTLOOM_OK);
+    info.byte_budget = budget_;
+    EXPECT_EQ(lightloom_stream_create(runtime, &info, &stream_), LIGHTLOOM_OK);
   }
-  void see(Vec3 position, Vec3 velocity) {
+  ~Stream() { lightloom_stream_destroy(stream_); }
+  uint64_t budget() const { return budget_; }
+
+  /// One frame's worth of it.
+  void see(Vec3 position, Vec3 velocity, uint64_t bytes) {
     lightloom_stream_view view{};
     view.struct_size = sizeof view;
     std::copy(&position.x, &position.x + 3, view.position);
     std::copy(&velocity.x, &velocity.x + 3, view.velocity);
     ASSERT_EQ(lightloom_stream_set_view(stream_, &view), LIGHTLOOM_OK);
-  }
-  void work(uint64_t bytes) { ASSERT_EQ(lightloom_stream_work(stream_, bytes, nullptr), LIGHTLOOM_OK); }
-  void frames(uint32_t n) { ASSERT_EQ(lightloom_update(runtime_, n), LIGHTLOOM_OK); }
-  std::vector<Vec3> irradiance() {
-    std::vector<Vec3> e(gallery().inputs.direct.size());
-    EXPECT_EQ(lightloom_read_irradiance(runtime_, &e[0].x, e.size()), LIGHTLOOM_OK);
-    return e;
+    ASSERT_EQ(lightloom_stream_work(stream_, bytes, nullptr), LIGHTLOOM_OK);
+    EXPECT_LE(state().bytes, budget_);
   }
   lightloom_stream_state state() const {
     lightloom_stream_state s{};
@@ -111,146 +81,220 @@ class Lit {
     EXPECT_EQ(lightloom_stream_get_state(stream_, &s), LIGHTLOOM_OK);
     return s;
   }
-  std::vector<uint8_t> levels() const {
-    std::vector<uint8_t> levels(gallery().level->manifest.cells.size());
-    EXPECT_EQ(lightloom_stream_get_levels(stream_, levels.data(), static_cast<uint32_t>(levels.size())), LIGHTLOOM_OK);
-    return levels;
-  }
-  lightloom_counts counts() const {
-    lightloom_counts c{};
-    c.struct_size = sizeof c;
-    EXPECT_EQ(lightloom_get_counts(runtime_, &c), LIGHTLOOM_OK);
-    return c;
-  }
-  lightloom_runtime* get() const { return runtime_; }
 
  private:
   ChunkStore store_;
-  std::vector<std::string> messages_;
-  lightloom_runtime* runtime_ = nullptr;
+  uint64_t budget_ = 0;
   lightloom_stream* stream_ = nullptr;
 };
 
-/// Receivers that face the eye with nothing in between.
-std::vector<uint32_t> visible_from(Vec3 eye) {
-  const auto& all = gallery().level->elements.receivers.all;
-  std::vector<uint32_t> visible;
-  for (uint32_t i = 0; i < all.size(); ++i) {
-    const Vec3 at = all[i].point.position + all[i].point.normal * 0.01f;
-    const Vec3 to = at - eye;
-    const float distance = length(to);
-    if (dot(to, all[i].point.normal) >= 0) continue;
-    if (!gallery().level->tracer->occluded(eye, to * (1 / distance), distance)) visible.push_back(i);
+/// The gallery without a device, streamed.
+class CpuFlight {
+ public:
+  explicit CpuFlight(double share) : runtime_(LIGHTLOOM_CREATE_CPU | LIGHTLOOM_CREATE_SMOOTHING) {
+    EXPECT_EQ(lightloom_load_manifest(runtime_.get(), gallery().manifest.data(), gallery().manifest.size()),
+              LIGHTLOOM_OK);
+    runtime_.light(gallery().light());
+    runtime_.options(0, 0, 0, 1, 0.2f);
+    stream_.emplace(runtime_.get(), share);
+  }
+  void frame(Vec3 position, Vec3 velocity) {
+    stream_->see(position, velocity, 1 << 20);
+    ASSERT_EQ(lightloom_update(runtime_.get(), 1), LIGHTLOOM_OK);
+  }
+  void stay(Vec3 position, int frames) {
+    for (int f = 0; f < frames; ++f) frame(position, {});
+  }
+  std::vector<Vec3> irradiance() { return runtime_.irradiance(); }
+  const Stream& stream() const { return *stream_; }
+
+ private:
+  testing::TestRuntime runtime_;
+  std::optional<Stream> stream_;
+};
+
+/// What faces an eye with nothing in between.
+struct Visible {
+  std::vector<uint32_t> receivers;
+  std::vector<double> solid_angle;  ///< of each; sr
+};
+Visible visible_from(Vec3 eye) {
+  const Receivers& receivers = gallery().level->elements.receivers;
+  Visible visible;
+  for (uint32_t i = 0; i < receivers.all.size(); ++i) {
+    const Receiver& r = receivers.all[i];
+    const Vec3 to = r.point.position + r.point.normal * 0.01f - eye;
+    const float distance = length(to), cosine = -dot(to, r.point.normal) / distance;
+    if (cosine <= 0 || gallery().level->tracer->occluded(eye, to * (1 / distance), distance)) continue;
+    visible.receivers.push_back(i);
+    const float area = receivers.grids[r.object].texels[r.texel].area;
+    visible.solid_angle.push_back(static_cast<double>(area * cosine / (distance * distance)));
   }
   return visible;
 }
 
-double rel_rmse(const std::vector<Vec3>& a, const std::vector<Vec3>& b, const std::vector<uint32_t>& at) {
+/// Relative, root mean square; `weights` empty: all alike.
+double error_at(const std::vector<Vec3>& e, const std::vector<uint32_t>& receivers,
+                const std::vector<double>& weights = {}) {
   double difference = 0, sum = 0;
-  for (const uint32_t i : at) {
+  for (size_t n = 0; n < receivers.size(); ++n) {
+    const double weight = weights.empty() ? 1 : weights[n];
     for (int c = 0; c < 3; ++c) {
-      const double x = static_cast<double>(a[i][c]), y = static_cast<double>(b[i][c]);
-      difference += (x - y) * (x - y);
-      sum += y * y;
+      const double truth = static_cast<double>(gallery().irradiance[receivers[n]][c]);
+      const double off = static_cast<double>(e[receivers[n]][c]) - truth;
+      difference += weight * off * off;
+      sum += weight * truth * truth;
     }
   }
   return std::sqrt(difference / sum);
 }
 
-TEST(Flight, Experiment) {
-  const Gallery& g = gallery();
-  Lit whole(LIGHTLOOM_CREATE_CPU);
-  whole.load_all();
-  // load() starts anew
-  const SurfaceInputs& in = g.inputs;
-  lightloom_set_direct(whole.get(), &in.direct[0].x, 0, in.direct.size());
-  lightloom_set_albedo(whole.get(), &in.albedo[0].x, 0, in.direct.size());
-  lightloom_set_emission(whole.get(), &in.emission[0].x, 0, in.direct.size());
-  lightloom_set_environment(whole.get(), &g.level->scene->environment.x);
-  whole.frames(40);
-  const std::vector<Vec3> truth = whole.irradiance();
-  std::vector<uint32_t> every(truth.size());
-  for (uint32_t i = 0; i < every.size(); ++i) every[i] = i;
-
-  const char* share = std::getenv("SHARE");
-  const uint64_t budget = static_cast<uint64_t>(static_cast<double>(g.asset_bytes) * (share ? atof(share) : 0.25));
-  std::printf("asset %.1f MB budget %.1f MB\n", g.asset_bytes / 1e6, budget / 1e6);
-  {
-    Lit part(LIGHTLOOM_CREATE_CPU);
-    part.stream(UINT64_MAX);
-    part.see({18, 1.7f, 14}, {});
-    part.work(UINT64_MAX);
-    part.frames(40);
-    std::printf("all streamed: %.5f bytes %.1f MB\n", rel_rmse(part.irradiance(), truth, every), part.state().bytes / 1e6);
-    Lit base(LIGHTLOOM_CREATE_CPU);
-    base.stream(1);
-    base.see({18, 1.7f, 14}, {});
-    base.work(UINT64_MAX);
-    base.frames(40);
-    std::printf("bases: %.5f bytes %.2f MB done %u\n", rel_rmse(base.irradiance(), truth, every), base.state().bytes / 1e6, base.state().done);
-  }
-  Lit part(LIGHTLOOM_CREATE_CPU);
-  lightloom_update_options o{};
-  o.struct_size = sizeof o;
-  o.fade = 0.2f;
-  lightloom_set_update_options(part.get(), &o);
-  part.stream(budget);
-  Vec3 eye{1.5f, 1.7f, 14};
-  const Vec3 v{3, 0, 0};
-  for (int stop = 0; stop < 5; ++stop) {
-    for (int frame = 0; frame < 160; ++frame) {
-      eye = eye + v * kFrame;
-      part.see(eye, v);
-      part.work(1 << 20);
-      part.frames(1);
-    }
-    const auto moving = part.irradiance();
-    for (int frame = 0; frame < 30; ++frame) {
-      part.see(eye, {});
-      part.work(1 << 20);
-      part.frames(1);
-    }
-    const auto e = part.irradiance();
-    const auto visible = visible_from(eye);
-    const auto levels = part.levels();
-    static std::vector<uint32_t> cell_of;
-    if (cell_of.empty()) {
-      cell_of.assign(truth.size(), 0);
-      const ChunkStore store = chunk_store(g.level->loom());
-      auto source = *AssetSource::open(g.manifest, [&](const ChunkRef& ref, std::span<uint8_t> out) -> absl::Status {
-        auto bytes = *store.get(ref);
-        std::copy(bytes.begin(), bytes.end(), out.begin());
-        return absl::OkStatus();
-      });
-      for (uint32_t c = 0; c < levels.size(); ++c) {
-        SourceCell cell = *source.cell(c);
-        for (uint32_t el : cell.elements) cell_of[el] = c;
+/// Bytes of the cells that have one of the receivers, and of all their probes, in all detail.
+uint64_t bytes_of(const std::vector<uint32_t>& receivers) {
+  const Manifest& m = gallery().level->manifest;
+  const auto& all = gallery().level->elements.receivers.all;
+  std::vector<bool> probes(m.probes.size());
+  uint64_t bytes = 0;
+  for (const CellEntry& c : m.cells) {
+    const auto inside = [&](uint32_t i) {
+      for (int a = 0; a < 3; ++a) {
+        if (std::floor(std::ldexp(all[i].point.position[a], -c.level)) !=
+            static_cast<float>(c.cell[static_cast<size_t>(a)]))
+          return false;
       }
-    }
-    std::vector<int> seen(levels.size());
-    std::vector<std::vector<uint32_t>> by(4);
-    for (uint32_t i : visible) { ++seen[cell_of[i]]; by[levels[cell_of[i]]].push_back(i); }
-    uint64_t need = 0; int n = 0;
-    std::vector<bool> probes(g.level->manifest.probes.size());
-    for (uint32_t c = 0; c < levels.size(); ++c) {
-      if (!seen[c]) continue;
-      ++n;
-      const auto& cell = g.level->manifest.cells[c];
-      need += cell.chunk.size;
-      for (uint32_t k = 0; k < cell.probes; ++k) probes[g.level->manifest.cell_probes[cell.first_probe + k]] = true;
-    }
-    std::printf("  visible cells %d: %.1f MB, probes %ld: %.1f MB;", n, need / 1e6, std::count(probes.begin(), probes.end(), true), std::count(probes.begin(), probes.end(), true) * 0.0164);
-    for (int l = 1; l < 4; ++l) std::printf(" level %d: %zu receivers %.4f;", l, by[l].size(), rel_rmse(e, truth, by[l]));
-    double m1 = 0, m2 = 0; for (uint32_t i : every) { m1 += (double)e[i].x; m2 += (double)truth[i].x; }
-    std::printf(" energy %.4f\n", m1 / m2);
-    const auto s = part.state();
-    std::printf("x %.1f: visible %zu, moving %.4f, there %.4f, all %.4f; cells %u/%u/%u probes %u/%u bytes %.2f drops %llu read %.1f MB done %u\n", eye.x,
-                visible.size(), rel_rmse(moving, truth, visible), rel_rmse(e, truth, visible), rel_rmse(e, truth, every),
-                s.base_cells, s.some_cells, s.all_cells, s.base_probes, s.all_probes, s.bytes / 1e6,
-                (unsigned long long)s.drops, s.read_bytes / 1e6, s.done);
+      return true;
+    };
+    if (std::none_of(receivers.begin(), receivers.end(), inside)) continue;
+    bytes += c.chunk.size;
+    for (uint32_t p = 0; p < c.probes; ++p) probes[m.cell_probes[c.first_probe + p]] = true;
   }
+  for (size_t p = 0; p < probes.size(); ++p) bytes += probes[p] ? m.probes[p].relight.size : 0;
+  return bytes;
 }
 
-#include "/tmp/m/exp.cpp"
+/// In each of the gallery's rooms, off its middle.
+std::vector<Vec3> rooms() {
+  std::vector<Vec3> at;
+  for (int z = 0; z < 3; ++z) {
+    for (int x = 0; x < 4; ++x) {
+      at.push_back({2.1f + 9.25f * static_cast<float>(x), 1.7f, 6.6f + 9.33f * static_cast<float>(z)});
+    }
+  }
+  return at;
+}
+
+TEST(Flight, WhereTheVisibleSetFitsItIsLitAsIfAllWereThere) {
+  int fit = 0, lit = 0;
+  for (const double share : {0.25, 0.5}) {
+    CpuFlight flight(share);
+    std::printf("budget %.0f %% of %.1f MB\n| at | visible MB | E of visible receivers | as seen | all receivers |\n",
+                100 * share, static_cast<double>(gallery().asset_bytes) / 1e6);
+    std::vector<uint32_t> all(gallery().irradiance.size());
+    std::iota(all.begin(), all.end(), 0);
+    for (const Vec3 eye : rooms()) {
+      // There at once, as after a cut.
+      flight.stay(eye, 60);
+      const std::vector<Vec3> e = flight.irradiance();
+      const Visible visible = visible_from(eye);
+      const double seen = error_at(e, visible.receivers, visible.solid_angle);
+      const uint64_t bytes = bytes_of(visible.receivers);
+      std::printf("| %.1f, %.1f | %.1f | %.4f | %.4f | %.4f |\n", static_cast<double>(eye.x),
+                  static_cast<double>(eye.z), static_cast<double>(bytes) / 1e6, error_at(e, visible.receivers), seen,
+                  error_at(e, all));
+      EXPECT_TRUE(flight.stream().state().done != 0);
+      EXPECT_LT(seen, 0.1);
+      // The bases are there too.
+      if (static_cast<double>(bytes) + 0.07 * static_cast<double>(gallery().asset_bytes) >
+          static_cast<double>(flight.stream().budget()))
+        continue;
+      ++fit;
+      lit += seen <= 0.02;
+      EXPECT_LE(seen, 0.035) << eye.x << ' ' << eye.z;
+    }
+  }
+  // One of them has a bright wall in view, two doors and 20 m away, that no probe around the eye sees.
+  EXPECT_EQ(fit, 12);
+  EXPECT_GE(lit, 11);
+}
+
+TEST(Flight, OnTheWayLightIsNeverFarOff) {
+  CpuFlight flight(0.25);
+  Vec3 eye{1.5f, 1.7f, 14};
+  const Vec3 velocity{3, 0, 0};
+  flight.stay(eye, 60);
+  std::vector<Vec3> before = flight.irradiance();
+  double worst_error = 0, worst_step = 0;
+  for (int frame = 0; frame < 640; ++frame) {
+    eye = eye + velocity * (1 / 60.0f);
+    flight.frame(eye, velocity);
+    if (frame % 40 != 0) continue;
+    const Visible visible = visible_from(eye);
+    before = flight.irradiance();
+    worst_error = std::max(worst_error, error_at(before, visible.receivers, visible.solid_angle));
+    // What one frame changes.
+    flight.frame(eye, velocity);
+    const std::vector<Vec3> after = flight.irradiance();
+    double step = 0, sum = 0;
+    for (size_t n = 0; n < visible.receivers.size(); ++n) {
+      const Vec3 d = after[visible.receivers[n]] - before[visible.receivers[n]], e = before[visible.receivers[n]];
+      step += visible.solid_angle[n] * static_cast<double>(dot(d, d));
+      sum += visible.solid_angle[n] * static_cast<double>(dot(e, e));
+    }
+    worst_step = std::max(worst_step, std::sqrt(step / sum));
+  }
+  std::printf("on the way: error as seen at most %.4f, a frame changes at most %.4f\n", worst_error, worst_step);
+  EXPECT_LT(worst_error, 0.15);
+  EXPECT_LT(worst_step, 0.02);
+}
+
+/// The hard limits, with a device and under validation: memory and what a frame uploads.
+TEST(Flight, BudgetAndUploadsHold) {
+  const uint64_t upload_bytes = 256 << 10;
+  const double share = 0.25;
+  uint64_t hard = 0;
+  {
+    // What the level takes without any chunk.
+    testing::Engine empty(VK_FORMAT_UNDEFINED, 0, [](const auto&, lightloom_vulkan_create_info* info) {
+      info->flags = LIGHTLOOM_CREATE_SMOOTHING;
+    });
+    ASSERT_EQ(lightloom_load_manifest(empty.runtime(), gallery().manifest.data(), gallery().manifest.size()),
+              LIGHTLOOM_OK);
+    hard = empty.counts().gpu_bytes + static_cast<uint64_t>(share * static_cast<double>(gallery().asset_bytes));
+  }
+  testing::Engine engine(VK_FORMAT_UNDEFINED, LIGHTLOOM_CREATE_VALIDATION,
+                         [&](const auto&, lightloom_vulkan_create_info* info) {
+                           info->flags = LIGHTLOOM_CREATE_SMOOTHING;
+                           info->byte_budget = hard;
+                           info->page_bytes = 1 << 20;
+                         });
+  ASSERT_EQ(lightloom_load_manifest(engine.runtime(), gallery().manifest.data(), gallery().manifest.size()),
+            LIGHTLOOM_OK);
+  engine.light(gallery().light());
+  lightloom_update_options options{};
+  options.struct_size = sizeof options;
+  options.upload_bytes = upload_bytes;
+  options.max_probes = 16;
+  options.max_cells = 16;
+  options.fade = 0.2f;
+  ASSERT_EQ(lightloom_set_update_options(engine.runtime(), &options), LIGHTLOOM_OK);
+  Stream stream(engine.runtime(), share);
+  Vec3 eye{1.5f, 1.7f, 14};
+  uint64_t most = 0, uploaded = 0;
+  for (int frame = 0; frame < 400; ++frame) {
+    eye.x += 0.08f;
+    stream.see(eye, {4.8f, 0, 0}, 1 << 20);
+    engine.frame();
+    const lightloom_counts counts = engine.counts();
+    ASSERT_LE(counts.gpu_bytes, hard);
+    ASSERT_LE(engine.stats().upload_bytes, upload_bytes);
+    most = std::max(most, counts.gpu_bytes);
+    uploaded += engine.stats().upload_bytes;
+  }
+  std::printf("device memory at most %.2f of %.2f MB; %.1f MB uploaded in 400 frames\n",
+              static_cast<double>(most) / 1e6, static_cast<double>(hard) / 1e6, static_cast<double>(uploaded) / 1e6);
+  EXPECT_GT(uploaded, hard / 4);
+  EXPECT_EQ(engine.counts().active_cells, gallery().level->manifest.cells.size());
+}
+
 }  // namespace
 }  // namespace lightloom

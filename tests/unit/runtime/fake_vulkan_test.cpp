@@ -92,6 +92,20 @@ class FakeVulkanTest : public ::testing::Test {
     info.read_user = &asset_;
     return lightloom_load(runtime, &info);
   }
+  /// Every cell twice, the second in place of the first.
+  lightloom_result load_parts(lightloom_runtime* runtime) {
+    lightloom_detail detail{};
+    detail.struct_size = sizeof detail;
+    for (const CellEntry& c : asset_.manifest.cells) {
+      const std::vector<uint8_t>& bytes = asset_.chunks.at(c.chunk.digest);
+      for (detail.max_rank = 0; detail.max_rank < 2; ++detail.max_rank) {
+        const lightloom_result result =
+            lightloom_load_chunk_part(runtime, c.chunk.digest.bytes.data(), bytes.data(), bytes.size(), &detail);
+        if (result != LIGHTLOOM_OK) return result;
+      }
+    }
+    return LIGHTLOOM_OK;
+  }
   lightloom_result record(lightloom_runtime* runtime) {
     static int commands;
     return lightloom_vulkan_record(runtime, reinterpret_cast<VkCommandBuffer>(&commands), nullptr);
@@ -106,6 +120,8 @@ class FakeVulkanTest : public ::testing::Test {
       if (frame == 2) {
         for (const CellEntry& c : asset_.manifest.cells) lightloom_unload_chunk(runtime, c.chunk.digest.bytes.data());
       }
+      if (frame == 3) result = load_parts(runtime);
+      if (result != LIGHTLOOM_OK) break;
       result = record(runtime);
     }
     lightloom_destroy(runtime);
@@ -188,6 +204,40 @@ TEST_F(FakeVulkanTest, FramesAllocateNothingAndCreateNothing) {
   EXPECT_EQ(heap_allocations, 0u);
   EXPECT_EQ(allocator_.calls, host);
   EXPECT_EQ(fake.created, created);
+  lightloom_destroy(runtime);
+}
+
+TEST_F(FakeVulkanTest, FramesAllocateNothingWhileDetailsTakeEachOthersPlace) {
+  lightloom_runtime* runtime = nullptr;
+  ASSERT_EQ(create(&runtime), LIGHTLOOM_OK);
+  ASSERT_EQ(load(runtime), LIGHTLOOM_OK);
+  ASSERT_EQ(record(runtime), LIGHTLOOM_OK);
+  uint64_t created = 0, host = 0, heap = 0;
+  for (uint32_t round = 0; round < 6; ++round) {
+    for (const CellEntry& c : asset_.manifest.cells) {
+      const std::vector<uint8_t>& bytes = asset_.chunks.at(c.chunk.digest);
+      lightloom_detail detail{};
+      detail.struct_size = sizeof detail;
+      detail.max_rank = round % 3;
+      ASSERT_EQ(lightloom_load_chunk_part(runtime, c.chunk.digest.bytes.data(), bytes.data(), bytes.size(), &detail),
+                LIGHTLOOM_OK)
+          << message_;
+    }
+    created -= fake.created;
+    host -= allocator_.calls;
+    heap_allocations = 0;
+    counting = true;
+    lightloom_result result = LIGHTLOOM_OK;
+    for (int frame = 0; frame < 8 && result == LIGHTLOOM_OK; ++frame) result = record(runtime);
+    counting = false;
+    heap += heap_allocations;
+    created += fake.created;
+    host += allocator_.calls;
+    EXPECT_EQ(result, LIGHTLOOM_OK) << message_;
+  }
+  EXPECT_EQ(heap, 0u);
+  EXPECT_EQ(host, 0u);
+  EXPECT_EQ(created, 0u);
   lightloom_destroy(runtime);
 }
 
