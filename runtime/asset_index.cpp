@@ -154,6 +154,17 @@ std::optional<AssetIndex::Target> AssetIndex::find(const Digest& digest) const {
   return it->target;
 }
 
+std::vector<AssetIndex::Kept> AssetIndex::kept_from(const AssetIndex& before) const {
+  std::vector<Kept> kept;
+  for (const Object& o : objects_) {
+    if (o.surface.size == 0) continue;
+    const std::optional<Target> same = before.find(o.surface.digest);
+    if (!same || same->kind != Kind::kSurface) continue;
+    kept.push_back({before.objects()[same->index].first_element, o.first_element, o.elements});
+  }
+  return kept;
+}
+
 absl::StatusOr<SurfaceChunk> AssetIndex::surface(uint32_t object, std::span<const uint8_t> bytes) const {
   const Object& o = objects_[object];
   const std::string what = "surface of object " + std::to_string(object);

@@ -75,6 +75,13 @@ class AssetIndex {
   }
   std::optional<Target> find(const Digest& digest) const;
 
+  /// Surface elements that are those of another asset.
+  struct Kept {
+    uint32_t from = 0, to = 0, count = 0;
+  };
+  /// Of `before` those whose object has the same surface here.
+  std::vector<Kept> kept_from(const AssetIndex& before) const;
+
   /// Decoded and compared with the manifest. DataLoss if anything is wrong; Unimplemented for newer versions.
   absl::StatusOr<SurfaceChunk> surface(uint32_t object, std::span<const uint8_t> bytes) const;
   absl::StatusOr<CellChunk> cell(uint32_t cell, std::span<const uint8_t> bytes) const;

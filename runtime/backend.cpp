@@ -7,9 +7,28 @@
 
 namespace lightloom {
 
-void Backend::use(std::shared_ptr<const AssetIndex> index) {
-  keys_.assign(index == nullptr ? 0 : index->objects().size(), nullptr);
-  index_ = std::move(index);
+void Backend::forget() {
+  keys_.clear();
+  index_ = nullptr;
+}
+
+absl::Status Backend::load_manifest(std::span<const uint8_t> bytes) {
+  // The old asset goes first: both may not fit.
+  unload();
+  return reload_manifest(bytes);
+}
+
+absl::Status Backend::reload_manifest(std::span<const uint8_t> bytes) {
+  LL_ASSIGN_OR_RETURN(const Manifest manifest, decode_manifest(bytes));
+  LL_ASSIGN_OR_RETURN(const std::shared_ptr<const AssetIndex> index, AssetIndex::create_shared(manifest, memory_));
+  const std::vector<AssetIndex::Kept> kept = loaded() ? index->kept_from(*index_) : std::vector<AssetIndex::Kept>();
+  if (const absl::Status started = start(index, kept); !started.ok()) {
+    unload();
+    return started;
+  }
+  keys_.assign(index->objects().size(), nullptr);
+  index_ = index;
+  return absl::OkStatus();
 }
 
 SurfaceKeys Backend::keys_of(uint32_t object) const {

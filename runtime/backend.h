@@ -38,7 +38,10 @@ class Backend {
   Backend& operator=(const Backend&) = delete;
 
   /// Replaces the asset; after a failure there is none.
-  virtual absl::Status load_manifest(std::span<const uint8_t> manifest) = 0;
+  absl::Status load_manifest(std::span<const uint8_t> manifest);
+  /// As load_manifest, but surface elements of objects with the same surface as before keep their inputs and E. A
+  /// manifest that is not valid changes nothing.
+  absl::Status reload_manifest(std::span<const uint8_t> manifest);
   virtual void unload() = 0;
   bool loaded() const { return index_ != nullptr; }
 
@@ -67,8 +70,10 @@ class Backend {
   virtual uint64_t pending_bytes() const = 0;
 
  protected:
-  /// For load_manifest and unload; null: no asset.
-  void use(std::shared_ptr<const AssetIndex> index);
+  /// For unload.
+  void forget();
+  /// REQUIRES: nothing is loaded, or, with `kept`, the asset that these are of.
+  virtual absl::Status start(std::shared_ptr<const AssetIndex> index, std::span<const AssetIndex::Kept> kept) = 0;
 
   // Any thread.
   virtual bool resident(const AssetIndex::Target& target, const Detail& detail) const = 0;

@@ -184,6 +184,13 @@ lightloom_result lightloom_load_manifest(lightloom_runtime* runtime, const void*
   });
 }
 
+lightloom_result lightloom_reload_manifest(lightloom_runtime* runtime, const void* manifest, uint64_t bytes) {
+  return with_asset(runtime, [&](Backend& backend) -> absl::Status {
+    if (manifest == nullptr) return absl::InvalidArgumentError("the manifest is null");
+    return backend.reload_manifest({static_cast<const uint8_t*>(manifest), bytes});
+  });
+}
+
 lightloom_result lightloom_load_chunk(lightloom_runtime* runtime, const uint8_t digest[32], const void* bytes,
                                       uint64_t size) {
   return with_asset(runtime, [&](Backend& backend) -> absl::Status {

@@ -9,10 +9,7 @@
 
 namespace lightloom {
 
-absl::Status SimdBackend::load_manifest(std::span<const uint8_t> bytes) {
-  unload();  // the old asset goes first: both may not fit
-  LL_ASSIGN_OR_RETURN(const Manifest manifest, decode_manifest(bytes));
-  LL_ASSIGN_OR_RETURN(const auto index, AssetIndex::create_shared(manifest, memory_));
+absl::Status SimdBackend::start(std::shared_ptr<const AssetIndex> index, std::span<const AssetIndex::Kept> kept) {
   SimdOptions options;
   options.threads = static_cast<int>(options_.threads);
   options.smoothing = options_.smoothing;
@@ -26,14 +23,14 @@ absl::Status SimdBackend::load_manifest(std::span<const uint8_t> bytes) {
   probes_.assign(index->probes().size(), {});
   cells_.assign(index->cells().size(), {});
   coarse_rays_ = coarse_rays(index->rays());
+  if (runtime_ != nullptr) runtime->inherit(*runtime_, kept);
   runtime_ = std::move(runtime);
-  use(index);
   return absl::OkStatus();
 }
 
 void SimdBackend::unload() {
+  forget();
   runtime_ = nullptr;
-  use(nullptr);
 }
 
 bool SimdBackend::resident(const AssetIndex::Target& target, const Detail& detail) const {

@@ -23,7 +23,6 @@ class SimdBackend final : public Backend {
     update_options_.smoothing = update_options_.fade = 1;
   }
 
-  absl::Status load_manifest(std::span<const uint8_t> manifest) override;
   void unload() override;
   void set(SurfaceInput input, uint64_t first, std::span<const float> rgb) override;
   void set_environment(Vec3 radiance) override { runtime_->set_environment(radiance); }
@@ -36,6 +35,7 @@ class SimdBackend final : public Backend {
   uint64_t pending_bytes() const override { return 0; }
 
  protected:
+  absl::Status start(std::shared_ptr<const AssetIndex> index, std::span<const AssetIndex::Kept> kept) override;
   bool resident(const AssetIndex::Target& target, const Detail& detail) const override;
   absl::Status load_surface(uint32_t object, const SurfaceChunk& chunk) override;
   absl::Status load_relight(uint32_t probe, std::span<const uint32_t> rays, const Detail& detail) override;

@@ -9,7 +9,7 @@
  * ascending. The manifest alone fixes S. Per-element arrays are S x 3 floats, linear RGB, element after element.
  *
  * Threads: lightloom_load_chunk, lightloom_unload_chunk, lightloom_set_*, lightloom_get_* and one recording
- * thread may run at once on one runtime. destroy, load, load_manifest, unload must be alone on it, with all
+ * thread may run at once on one runtime. destroy, load, load_manifest, reload_manifest, unload must be alone on it, with all
  * recorded frames finished; create, update and read_irradiance count as recording.
  * Different runtimes are independent.
  *
@@ -119,6 +119,13 @@ LIGHTLOOM_API void lightloom_destroy(lightloom_runtime* runtime);
  * resident. */
 LIGHTLOOM_API lightloom_result lightloom_load_manifest(lightloom_runtime* runtime, const void* manifest,
                                                        uint64_t bytes);
+
+/* The level was baked anew: as lightloom_load_manifest, but elements of objects whose surface chunk is the same as before
+ * keep direct, albedo, emission and E, under their new numbers; the sky stays. So the level goes on as it was lit until
+ * its chunks are there, and those of new objects start dark. Streams must be destroyed before. A manifest that is
+ * not valid changes nothing; on another failure no asset is loaded. */
+LIGHTLOOM_API lightloom_result lightloom_reload_manifest(lightloom_runtime* runtime, const void* manifest,
+                                                         uint64_t bytes);
 
 /* Makes a chunk of the manifest resident; the bytes are copied, their SHA-256, structure and agreement with the
  * manifest are checked. An object's surface chunk comes before the cell and relight chunks that name the object

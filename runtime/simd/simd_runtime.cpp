@@ -26,6 +26,11 @@ SimdRuntime::SimdRuntime(const AssetIndex& index, const SimdOptions& options)
       probes_(memory_, index),
       cells_(memory_, index) {}
 
+void SimdRuntime::inherit(const SimdRuntime& before, std::span<const AssetIndex::Kept> kept) {
+  const std::scoped_lock lock(mutex_, before.mutex_);
+  surface_.inherit(before.surface_, kept);
+}
+
 absl::Status SimdRuntime::load_cell(uint32_t cell, simd::PackedCell packed, bool over_base) {
   const std::lock_guard lock(mutex_);
   return cells_.load(cell, std::move(packed), over_base);

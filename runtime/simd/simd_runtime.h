@@ -67,6 +67,9 @@ class SimdRuntime {
     return simd::pack_probe(rays, surface_.elements(), memory_);
   }
 
+  /// Takes over inputs and E of another asset's surface elements. Before the first frame.
+  void inherit(const SimdRuntime& before, std::span<const AssetIndex::Kept> kept);
+
   /// Indices into the manifest. What is resident already is replaced, or `over_base`, kept beneath. A cell takes part once all its probes are
   /// resident; until then, and after it is unloaded, its E stays what it was. DataLoss: two resident receivers are the
   /// same surface element.

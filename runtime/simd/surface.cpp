@@ -60,6 +60,20 @@ void Surface::set(Input input, uint32_t first, std::span<const float> rgb) {
   }
 }
 
+void Surface::inherit(const Surface& before, std::span<const AssetIndex::Kept> kept) {
+  const auto copy = [&kept](const Array<float>& from, Array<float>* to) {
+    for (const AssetIndex::Kept& k : kept) {
+      std::copy_n(from.data() + size_t{3} * k.from, size_t{3} * k.count, to->data() + size_t{3} * k.to);
+    }
+  };
+  for (size_t input = 0; input < 3; ++input) copy(before.inputs_[input], &inputs_[input]);
+  copy(before.irradiance_, &irradiance_);
+  if (smoothing_) std::copy(irradiance_.begin(), irradiance_.end(), target_.begin());
+  environment_ = before.environment_;
+  dirty_.fill(1);
+  any_dirty_ = true;
+}
+
 void Surface::reset() {
   irradiance_.fill(0);
   target_.fill(0);

@@ -23,6 +23,8 @@ class Surface {
   /// Values from element `first` on, packed RGB. Only tiles whose bytes differ count as changed.
   void set(Input input, uint32_t first, std::span<const float> rgb);
   void set_environment(Vec3 radiance) { environment_ = radiance; }
+  /// Takes over inputs, E and the sky.
+  void inherit(const Surface& before, std::span<const AssetIndex::Kept> kept);
   /// E and B are 0, and every B is looked at again.
   void reset();
 

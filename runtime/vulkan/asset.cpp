@@ -408,6 +408,7 @@ void VulkanAsset::set_options(const lightloom_update_options& options) {
 void VulkanAsset::reset_feedback() {
   const std::lock_guard lock(mutex_);
   reset_ = true;
+  if (inherited_until_ == 0) inherited_parts_.clear();
   touch();
 }
 

@@ -43,6 +43,11 @@ class VulkanAsset {
                                                              const AssetOptions& options,
                                                              std::pmr::memory_resource* memory);
 
+  /// No chunk is resident any more. REQUIRES: all recorded frames are finished, none follows.
+  void free_chunks();
+  /// Takes over inputs and E. Before the first frame.
+  void inherit(VulkanAsset* before, std::span<const AssetIndex::Kept> kept);
+
   // As Backend's.
   bool resident(const AssetIndex::Target& target, const Detail& detail) const;
   absl::Status load_surface(uint32_t object, const SurfaceChunk& chunk);
@@ -148,7 +153,10 @@ class VulkanAsset {
   mutable std::mutex mutex_;  ///< guards all below
   std::array<ShadowTable, 3> inputs_;
   ShadowTable cell_table_, slot_table_, map_table_;
-  Buffer irradiance_;  ///< with smoothing followed by where each E goes
+  Buffer inherited_;                                ///< E of the asset before this
+  std::pmr::vector<VkBufferCopy> inherited_parts_;  ///< of it that the first frame copies
+  uint32_t inherited_until_ = 0;                    ///< the frame that frees it; 0: not copied yet
+  Buffer irradiance_;                               ///< with smoothing followed by where each E goes
   Buffer radiosity_, points_, normals_, lambda_, changed_, dirty_, slot_seen_, stamps_;
   std::array<Buffer, 2> sh_;  ///< of every ray, and of the coarse sets'
   Buffer active_slots_, cell_probes_, cell_dirty_, cell_seen_, active_cells_, control_;
@@ -180,7 +188,7 @@ class VulkanAsset {
   bool reset_ = false;        ///< E is to be set to 0
   bool image_stale_ = true;   ///< all of the image is to be written
   bool smooth_ = false;       ///< targets hold what E goes towards
-  uint64_t chunk_bytes_ = 0;         ///< that the newest frame copies
+  uint64_t chunk_bytes_ = 0;  ///< that the newest frame copies
   uint32_t fade_frames_ = 0;  ///< that are left until a change of the model has arrived
   bool sky_changed_ = true;
   bool direct_overwritten_ = false;  ///< the direct pass wrote where the host's values were

@@ -1,5 +1,6 @@
 // What an asset has on the device before any of its chunks is resident.
 #include <algorithm>
+#include <utility>
 
 #include "core/base/sh.h"
 #include "runtime/vulkan/asset.h"
@@ -25,6 +26,7 @@ VulkanAsset::VulkanAsset(Context* context, const Pipelines* pipelines, std::shar
       cell_table_(memory),
       slot_table_(memory),
       map_table_(memory),
+      inherited_parts_(memory),
       coarse_rays_(memory),
       surfaces_(index_.objects().size(), false, memory),
       probes_(index_.probes().size(), memory),
@@ -43,6 +45,27 @@ absl::StatusOr<std::unique_ptr<VulkanAsset>> VulkanAsset::create(Context* contex
   LL_RETURN_IF_ERROR(asset->create_arrays());
   LL_RETURN_IF_ERROR(asset->create_sets());
   return asset;
+}
+
+void VulkanAsset::free_chunks() {
+  cell_pools_ = nullptr;
+  relight_pools_ = nullptr;
+}
+
+void VulkanAsset::inherit(VulkanAsset* before, std::span<const AssetIndex::Kept> kept) {
+  for (size_t input = 0; input < inputs_.size(); ++input) {
+    for (const AssetIndex::Kept& k : kept) {
+      std::copy_n(before->inputs_[input].as<float>() + size_t{3} * k.from, size_t{3} * k.count,
+                  inputs_[input].as<float>() + size_t{3} * k.to);
+      inputs_[input].touch(12ull * k.to, 12ull * (k.to + k.count));
+    }
+  }
+  settings_.environment = before->settings_.environment;
+  if (!before->cleared_) return;  // its E is 0
+  for (const AssetIndex::Kept& k : kept) {
+    if (k.count > 0) inherited_parts_.push_back({12ull * k.from, 12ull * k.to, 12ull * k.count});
+  }
+  inherited_ = std::move(before->irradiance_);
 }
 
 absl::Status VulkanAsset::create_arrays() {

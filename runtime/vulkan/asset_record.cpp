@@ -78,6 +78,7 @@ void VulkanAsset::free_graves(uint32_t frame) {
     }
   }
   graves_.erase(graves_.begin(), g);
+  if (inherited_until_ != 0 && inherited_until_ <= frame) inherited_ = Buffer();
   relight_pools_->free_retired(frame);
   cell_pools_->free_retired(frame);
 }
@@ -169,6 +170,13 @@ absl::Status VulkanAsset::record_uploads(VkCommandBuffer commands, uint32_t fram
   const VulkanTable& vk = context_->vk;
   if (!cleared_) record_clears(commands);
   cleared_ = true;
+  if (inherited_.exists() && inherited_until_ == 0) {
+    if (!inherited_parts_.empty()) {
+      vk.CmdCopyBuffer(commands, inherited_.handle(), irradiance_.handle(),
+                       static_cast<uint32_t>(inherited_parts_.size()), inherited_parts_.data());
+    }
+    inherited_until_ = frame + context_->frames;
+  }
   if (reset_) {
     for (const Buffer* b : {&irradiance_, &cell_seen_}) vk.CmdFillBuffer(commands, b->handle(), 0, VK_WHOLE_SIZE, 0);
     reset_ = false;

@@ -68,20 +68,27 @@ VulkanBackend::~VulkanBackend() {
   lightloom_vulkan_destroy_device(&own_device_);
 }
 
-absl::Status VulkanBackend::load_manifest(std::span<const uint8_t> bytes) {
-  // The old asset goes first: both may not fit.
-  unload();
-  LL_ASSIGN_OR_RETURN(const Manifest manifest, decode_manifest(bytes));
-  LL_ASSIGN_OR_RETURN(const auto index, AssetIndex::create_shared(manifest, memory_));
-  LL_ASSIGN_OR_RETURN(asset_, VulkanAsset::create(&context_, pipelines_.get(), index, asset_options_, memory_));
-  asset_->set_options(options_);
-  use(index);
+absl::Status VulkanBackend::start(std::shared_ptr<const AssetIndex> index, std::span<const AssetIndex::Kept> kept) {
+  const std::unique_ptr<VulkanAsset> before = std::move(asset_);
+  forget_frames();
+  // Both may not fit.
+  if (before != nullptr) before->free_chunks();
+  LL_ASSIGN_OR_RETURN(auto asset,
+                      VulkanAsset::create(&context_, pipelines_.get(), std::move(index), asset_options_, memory_));
+  asset->set_options(options_);
+  if (before != nullptr) asset->inherit(before.get(), kept);
+  asset_ = std::move(asset);
   return absl::OkStatus();
 }
 
 void VulkanBackend::unload() {
-  use(nullptr);
+  forget();
   asset_ = nullptr;
+  forget_frames();
+}
+
+/// REQUIRES: all are finished.
+void VulkanBackend::forget_frames() {
   frame_ = taken_ = 0;
   frame_memory_->forget();
   const std::lock_guard lock(stats_mutex_);

@@ -18,7 +18,6 @@ class VulkanBackend final : public Backend {
   absl::Status own(const lightloom_vulkan_device& device);
   ~VulkanBackend() override;
 
-  absl::Status load_manifest(std::span<const uint8_t> manifest) override;
   void unload() override;
   void set(SurfaceInput input, uint64_t first, std::span<const float> rgb) override { asset_->set(input, first, rgb); }
   void set_environment(Vec3 radiance) override { asset_->set_environment(radiance); }
@@ -35,6 +34,7 @@ class VulkanBackend final : public Backend {
   void fill_outputs(lightloom_vulkan_outputs* outputs) const { asset_->fill_outputs(outputs); }
 
  protected:
+  absl::Status start(std::shared_ptr<const AssetIndex> index, std::span<const AssetIndex::Kept> kept) override;
   bool resident(const AssetIndex::Target& target, const Detail& detail) const override {
     return asset_->resident(target, detail);
   }
@@ -52,6 +52,7 @@ class VulkanBackend final : public Backend {
 
  private:
   explicit VulkanBackend(std::pmr::memory_resource* memory) : Backend(memory) {}
+  void forget_frames();
   absl::Status take(uint32_t frame);
   absl::Status run_frames(uint32_t frames, FrameKind kind);
 
