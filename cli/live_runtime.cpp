@@ -45,8 +45,7 @@ absl::Status LiveRuntime::set_materials(const SurfaceInputs& inputs) {
 
 absl::Status LiveRuntime::set_materials(const SurfaceInputs& inputs, uint64_t first) {
   const uint64_t count = inputs.albedo.size();
-  LL_RETURN_IF_ERROR(
-      messages_.status(lightloom_set_albedo(runtime_.get(), floats(inputs.albedo), first, count)));
+  LL_RETURN_IF_ERROR(messages_.status(lightloom_set_albedo(runtime_.get(), floats(inputs.albedo), first, count)));
   return messages_.status(lightloom_set_emission(runtime_.get(), floats(inputs.emission), first, count));
 }
 

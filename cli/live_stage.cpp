@@ -45,8 +45,7 @@ class LiveStage : public Stage {
   absl::StatusOr<Image> lightmap() override {
     const size_t n = elements_.receivers.all.size();
     const uint64_t bytes = runtime_->outputs().irradiance_bytes;
-    LL_ASSIGN_OR_RETURN(const renderer::Buffer host,
-                        gpu_->host_buffer(bytes, VK_BUFFER_USAGE_TRANSFER_DST_BIT));
+    LL_ASSIGN_OR_RETURN(const renderer::Buffer host, gpu_->host_buffer(bytes, VK_BUFFER_USAGE_TRANSFER_DST_BIT));
     LL_RETURN_IF_ERROR(gpu_->run([&](VkCommandBuffer commands) -> absl::Status {
       if (waiting_) {
         renderer_->record_shadows(commands);

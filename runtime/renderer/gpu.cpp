@@ -144,7 +144,8 @@ absl::Status Gpu::choose_device() {
   if (physical_ == VK_NULL_HANDLE) {
     if (surface_ != VK_NULL_HANDLE) {
       return absl::NotFoundError(
-          "no Vulkan 1.3 device can show pictures on this display; install a driver (mesa-vulkan-drivers has a software "
+          "no Vulkan 1.3 device can show pictures on this display; install a driver (mesa-vulkan-drivers has a "
+          "software "
           "one), check VK_ICD_FILENAMES, or use lightloom render");
     }
     return absl::NotFoundError(

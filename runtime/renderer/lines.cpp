@@ -65,7 +65,8 @@ void Marks::square(Vec3 centre, Vec3 normal, float half, Rgba colour) {
   orthonormal_basis(normal, &s, &t);
   s *= half;
   t *= half;
-  for (const Vec3 p : {centre - s - t, centre + s - t, centre + s + t, centre - s - t, centre + s + t, centre - s + t}) {
+  for (const Vec3 p :
+       {centre - s - t, centre + s - t, centre + s + t, centre - s - t, centre + s + t, centre - s + t}) {
     triangles.push_back({p, colour});
   }
 }
@@ -92,8 +93,7 @@ absl::StatusOr<Lines> Lines::create(Gpu* gpu, VkFormat colour_format) {
   out.gpu_ = gpu;
   LL_ASSIGN_OR_RETURN(out.layout_, pipeline_layout(gpu->device(), {}, sizeof(gpu::LinesPush)));
   const VkPipelineLayout layout = out.layout_.get();
-  LL_ASSIGN_OR_RETURN(out.lines_,
-                      make_pipeline(gpu->device(), layout, colour_format, VK_PRIMITIVE_TOPOLOGY_LINE_LIST));
+  LL_ASSIGN_OR_RETURN(out.lines_, make_pipeline(gpu->device(), layout, colour_format, VK_PRIMITIVE_TOPOLOGY_LINE_LIST));
   LL_ASSIGN_OR_RETURN(out.triangles_,
                       make_pipeline(gpu->device(), layout, colour_format, VK_PRIMITIVE_TOPOLOGY_TRIANGLE_LIST));
   return out;

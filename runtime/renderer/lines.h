@@ -46,7 +46,7 @@ class Lines {
   Gpu* gpu_ = nullptr;
   Owned<VkPipelineLayout> layout_;
   Owned<VkPipeline> lines_, triangles_;
-  Buffer vertices_;  ///< the triangles', then the lines'
+  Buffer vertices_;                               ///< the triangles', then the lines'
   uint32_t line_count_ = 0, triangle_count_ = 0;  ///< vertices
 };
 

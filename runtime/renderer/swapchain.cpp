@@ -35,7 +35,8 @@ absl::StatusOr<VkSurfaceFormatKHR> choose_format(const Gpu& gpu) {
       return format;
     }
   }
-  return absl::NotFoundError("this display takes no pictures of 8 bits per colour; use another one, or lightloom render");
+  return absl::NotFoundError(
+      "this display takes no pictures of 8 bits per colour; use another one, or lightloom render");
 }
 
 absl::StatusOr<Owned<VkSemaphore>> semaphore(VkDevice device) {
@@ -107,8 +108,8 @@ absl::StatusOr<bool> Swapchain::resize(uint32_t width, uint32_t height) {
 
 absl::StatusOr<std::optional<uint32_t>> Swapchain::acquire() {
   uint32_t image = 0;
-  const VkResult result = vkAcquireNextImageKHR(gpu_->device(), chain_.get(), UINT64_MAX, acquired_.get(),
-                                                VK_NULL_HANDLE, &image);
+  const VkResult result =
+      vkAcquireNextImageKHR(gpu_->device(), chain_.get(), UINT64_MAX, acquired_.get(), VK_NULL_HANDLE, &image);
   if (result == VK_ERROR_OUT_OF_DATE_KHR) return std::optional<uint32_t>();
   // A suboptimal image is shown all the same: its semaphore will be signalled.
   if (result != VK_SUBOPTIMAL_KHR) LL_VK_RETURN_IF_ERROR("vkAcquireNextImageKHR", result);
