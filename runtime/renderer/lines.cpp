@@ -1,5 +1,6 @@
 #include "runtime/renderer/lines.h"
 
+#include <cmath>
 #include <cstddef>
 #include <cstring>
 
@@ -61,10 +62,9 @@ void Marks::box(const Aabb& box, Rgba colour) {
 }
 
 void Marks::square(Vec3 centre, Vec3 normal, float half, Rgba colour) {
-  Vec3 s, t;
-  orthonormal_basis(normal, &s, &t);
-  s *= half;
-  t *= half;
+  // Upright on walls, as most lightmaps are.
+  const Vec3 s = normalize(cross(std::abs(normal.y) < 0.99f ? Vec3{0, 1, 0} : Vec3{0, 0, 1}, normal)) * half;
+  const Vec3 t = cross(normal, s);
   for (const Vec3 p :
        {centre - s - t, centre + s - t, centre + s + t, centre - s - t, centre + s + t, centre - s + t}) {
     triangles.push_back({p, colour});

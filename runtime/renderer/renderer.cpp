@@ -140,7 +140,13 @@ absl::Status Renderer::update_lights() {
 }
 
 void Renderer::record_shadows(VkCommandBuffer commands) const {
-  shadow_maps_->record(commands, views_.views, pipelines_, vertices_.handle.get(), mesh_, scene_, *materials_);
+  const bool keep = drawn_.has_value();
+  std::vector<gpu::ViewData> changed;
+  for (size_t v = 0; v < views_.views.size(); ++v) {
+    if (!keep || (*drawn_)[v].view_projection != views_.views[v].view_projection) changed.push_back(views_.views[v]);
+  }
+  shadow_maps_->record(commands, changed, keep, pipelines_, vertices_.handle.get(), mesh_, scene_, *materials_);
+  drawn_ = views_.views;
 }
 
 absl::Status Renderer::set_size(uint32_t width, uint32_t height) {
@@ -243,7 +249,11 @@ absl::Status Renderer::set_view(const Camera& camera, Layer layer) {
 absl::Status Renderer::record(VkCommandBuffer commands,
                               const std::function<absl::Status(VkCommandBuffer)>& between) const {
   record_shadows(commands);
-  if (between) LL_RETURN_IF_ERROR(between(commands));
+  const absl::Status status = between ? between(commands) : absl::OkStatus();
+  if (!status.ok()) {
+    drawn_.reset();  // nothing of this will run
+    return status;
+  }
   record_forward(commands);
   return absl::OkStatus();
 }
@@ -286,6 +296,7 @@ absl::Status Renderer::update_object(size_t object) {
     at += size;
   }
   bounds_ = scene_.bounds();
+  drawn_.reset();
   return gpu_->run([&](VkCommandBuffer commands) {
     vkCmdCopyBuffer(commands, staging.handle.get(), vertices_.handle.get(), static_cast<uint32_t>(regions.size()),
                     regions.data());

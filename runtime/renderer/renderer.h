@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "core/receivers/layout.h"
@@ -42,6 +43,7 @@ class Renderer {
   /// After update_lights().
   const ShadowViews& shadow_views() const { return views_; }
   const ShadowMaps& shadow_maps() const { return *shadow_maps_; }
+  /// Only those whose light has moved since. What is recorded must run.
   void record_shadows(VkCommandBuffer commands) const;
 
   /// A whole frame: update_lights, shadow maps, what `between` records (lightloom, for instance), the forward pass.
@@ -79,6 +81,7 @@ class Renderer {
   std::unique_ptr<Materials> materials_;
   std::unique_ptr<ShadowMaps> shadow_maps_;
   ShadowViews views_;
+  mutable std::optional<std::vector<gpu::ViewData>> drawn_;  ///< what the shadow maps hold; none: nothing of use
   std::vector<LightType> light_types_;
   Aabb bounds_;
   Buffer frame_data_, light_data_, view_data_;
