@@ -14,6 +14,7 @@ namespace {
 
 constexpr float kTurn = 0.004f;       // radians a pixel
 constexpr float kNearLight = 12;      // pixels
+constexpr float kClickMoves = 4;      // pixels that a click may move
 constexpr float kFaster = 4;          // with shift
 constexpr float kLongestStep = 0.1f;  // seconds: a frame that hung does not throw the camera away
 
@@ -42,13 +43,15 @@ std::optional<size_t> light_at(const Scene& scene, const Camera& camera, Vec2 at
 
 std::vector<float> values(Vec3 v) { return {v.x, v.y, v.z}; }
 
-void keys(const State& state, std::vector<Action>* actions) {
-  const auto pressed = [](int key) { return ImGui::IsKeyPressed(key, /*repeat=*/false); };
-  if (pressed(GLFW_KEY_F2)) actions->push_back({Verb::kScreenshot, ""});
-  if (ImGui::GetIO().WantCaptureKeyboard) return;
-  if (pressed(GLFW_KEY_H)) actions->push_back({Verb::kOverlay, "panel", {}, state.overlays.count("panel") == 0});
-  if (pressed(GLFW_KEY_DELETE) && state.picked) actions->push_back({Verb::kDelete});
-  if (pressed(GLFW_KEY_ESCAPE)) actions->push_back({Verb::kPick, ""});
+void keys(const Events& events, const State& state, std::vector<Action>* actions) {
+  const bool typing = ImGui::GetIO().WantCaptureKeyboard;
+  for (const int key : events.keys) {
+    if (key == GLFW_KEY_F2) actions->push_back({Verb::kScreenshot, ""});
+    if (typing) continue;
+    if (key == GLFW_KEY_H) actions->push_back({Verb::kOverlay, "panel", {}, state.overlays.count("panel") == 0});
+    if (key == GLFW_KEY_DELETE && state.picked) actions->push_back({Verb::kDelete});
+    if (key == GLFW_KEY_ESCAPE) actions->push_back({Verb::kPick, ""});
+  }
 }
 
 }  // namespace
@@ -107,8 +110,8 @@ void Input::drag(const LiveLevel& level, const Camera& camera, Vec2 from, Vec2 t
       }
       break;
     case Grip::kView: {
-      const ImVec2 delta = ImGui::GetIO().MouseDelta;
-      state->camera.turn(-delta.x * kTurn, -delta.y * kTurn);
+      const ImVec2 size = ImGui::GetIO().DisplaySize;
+      state->camera.turn((from.x - to.x) * size.x * kTurn, (from.y - to.y) * size.y * kTurn);
       break;
     }
     case Grip::kNothing:
@@ -116,25 +119,27 @@ void Input::drag(const LiveLevel& level, const Camera& camera, Vec2 from, Vec2 t
   }
 }
 
-absl::StatusOr<std::vector<Action>> Input::read(LiveLevel* level, State* state, float aspect) {
+absl::StatusOr<std::vector<Action>> Input::read(const Events& events, LiveLevel* level, State* state, float aspect) {
   const ImGuiIO& io = ImGui::GetIO();
   std::vector<Action> actions;
-  busy_ = ImGui::IsAnyMouseDown() || io.MouseDelta.x != 0 || io.MouseDelta.y != 0;
-  keys(*state, &actions);
+  busy_ = !events.keys.empty() || ImGui::IsAnyMouseDown() || io.MouseDelta.x != 0 || io.MouseDelta.y != 0;
+  keys(events, *state, &actions);
   fly(state);
   const Camera camera = state->camera.camera(aspect);
   const Vec2 at = place(io.MousePos);
   if (ImGui::IsMouseClicked(ImGuiMouseButton_Left) && !io.WantCaptureMouse) {
-    LL_RETURN_IF_ERROR(press(level, *state, camera, at));
+    // In a slow frame the mouse may be elsewhere already.
+    pressed_ = last_ = events.left_press ? place({events.left_press->x, events.left_press->y}) : at;
+    LL_RETURN_IF_ERROR(press(level, *state, camera, pressed_));
   }
   if (grip_ == Grip::kNothing) return actions;
-  moved_ |= ImGui::IsMouseDragging(ImGuiMouseButton_Left);
-  if (moved_ && (io.MouseDelta.x != 0 || io.MouseDelta.y != 0)) {
-    drag(*level, camera, place({io.MousePos.x - io.MouseDelta.x, io.MousePos.y - io.MouseDelta.y}), at, state,
-         &actions);
+  moved_ |= pixels_between(pressed_, at) > kClickMoves;
+  if (moved_ && at != last_) {
+    drag(*level, camera, last_, at, state, &actions);
+    last_ = at;
   }
   if (ImGui::IsMouseReleased(ImGuiMouseButton_Left)) {
-    if (!moved_ && grip_ != Grip::kLight) actions.push_back({Verb::kClick, "", {at.x, at.y}});
+    if (!moved_ && grip_ != Grip::kLight) actions.push_back({Verb::kClick, "", {pressed_.x, pressed_.y}});
     grip_ = Grip::kNothing;
   }
   return actions;

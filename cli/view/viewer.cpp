@@ -17,6 +17,8 @@ namespace {
 constexpr int kSettle = 16;
 /// Frames without news, after which the viewer sleeps until some come.
 constexpr int kQuiet = 90;
+/// Frames to draw then, for the panel to follow the mouse.
+constexpr int kAfterNews = 3;
 
 double smoothed(double old, double now) { return old > 0 ? old + 0.1 * (now - old) : now; }
 
@@ -70,11 +72,13 @@ absl::Status Viewer::reload() {
 absl::Status Viewer::run() {
   while (!done_ && !window_->closed()) {
     LL_RETURN_IF_ERROR(not_interrupted());
-    const bool script_sleeps = wait_bake_ && bake_.running();
-    window_->poll(quiet_ > kQuiet || script_sleeps);
+    const bool idle = quiet_ > kQuiet || (wait_bake_ && bake_.running());
+    const bool news = window_->poll(idle);
+    if (news && idle) quiet_ = std::min(quiet_, kQuiet - kAfterNews);
     LL_RETURN_IF_ERROR(look_after_bake());
     LL_RETURN_IF_ERROR(step_script());
-    if (!done_) LL_RETURN_IF_ERROR(frame());
+    const bool asleep = quiet_ > kQuiet && !bake_.running();  // a bake has progress to show, now and then
+    if (!done_ && !asleep) LL_RETURN_IF_ERROR(frame());
   }
   return gpu_->validation();
 }
@@ -83,7 +87,6 @@ absl::Status Viewer::look_after_bake() {
   const bool ended = bake_.poll();
   state_.baking = bake_.running();
   state_.progress = bake_.progress();
-  if (state_.baking) quiet_ = 0;
   if (!ended) return absl::OkStatus();
   quiet_ = 0;
   absl::Status result = bake_.result();
@@ -143,7 +146,8 @@ absl::Status Viewer::frame() {
   std::vector<Action> actions;
   if (state_.overlays.count("panel") > 0) actions = draw_panel(*level_, state_, options_.save_as);
   if (state_.overlays.count("lights") > 0) draw_lights(*level_, state_.camera.camera(screen_->aspect()));
-  LL_ASSIGN_OR_RETURN(const std::vector<Action> by_hand, input_.read(level_.get(), &state_, screen_->aspect()));
+  LL_ASSIGN_OR_RETURN(const std::vector<Action> by_hand,
+                      input_.read(window_->events(), level_.get(), &state_, screen_->aspect()));
   screen_->ui().end();
   actions.insert(actions.end(), by_hand.begin(), by_hand.end());
   quiet_ = input_.busy() ? 0 : quiet_ + 1;

@@ -6,12 +6,15 @@
 
 #include <algorithm>
 
+#include "core/base/stopwatch.h"
 #include "runtime/renderer/status.h"
 
 namespace lightloom::view {
 namespace {
 
 constexpr double kIdleSeconds = 0.1;
+
+Window* itself(GLFWwindow* window) { return static_cast<Window*>(glfwGetWindowUserPointer(window)); }
 
 }  // namespace
 
@@ -32,6 +35,11 @@ absl::StatusOr<std::unique_ptr<Window>> Window::create(const std::string& title,
     return absl::UnavailableError(std::string("cannot open a window: ") + (why ? why : "no reason given") +
                                   "; check DISPLAY, or use lightloom render");
   }
+  // ImGui's own callbacks, which come later, call these.
+  glfwSetWindowUserPointer(out->window_, out.get());
+  glfwSetKeyCallback(out->window_, on_key);
+  glfwSetCursorPosCallback(out->window_, on_cursor);
+  glfwSetMouseButtonCallback(out->window_, on_button);
   return out;
 }
 
@@ -53,12 +61,28 @@ renderer::WindowSystem Window::system() const {
   return system;
 }
 
-void Window::poll(bool idle) const {
-  if (idle) {
-    glfwWaitEventsTimeout(kIdleSeconds);
-  } else {
+void Window::on_key(GLFWwindow* window, int key, int, int action, int) {
+  if (action == GLFW_PRESS) itself(window)->events_.keys.push_back(key);
+}
+
+void Window::on_cursor(GLFWwindow* window, double x, double y) {
+  itself(window)->cursor_ = {static_cast<float>(x), static_cast<float>(y)};
+}
+
+void Window::on_button(GLFWwindow* window, int button, int action, int) {
+  Window* const self = itself(window);
+  if (action == GLFW_PRESS && button == GLFW_MOUSE_BUTTON_LEFT) self->events_.left_press = self->cursor_;
+}
+
+bool Window::poll(bool idle) {
+  events_ = {};
+  if (!idle) {
     glfwPollEvents();
+    return true;
   }
+  const Stopwatch watch;
+  glfwWaitEventsTimeout(kIdleSeconds);
+  return watch.seconds() < 0.9 * kIdleSeconds;
 }
 
 bool Window::closed() const { return glfwWindowShouldClose(window_) == GLFW_TRUE; }

@@ -84,7 +84,7 @@ class Loader {
       visited[i] = true;
 
       const auto local = local_transform(node.matrix, node.translation, node.rotation, node.scale);
-    if (!local.ok()) return invalid(whose + ": " + std::string(local.status().message()));
+      if (!local.ok()) return invalid(whose + ": " + std::string(local.status().message()));
       const Transform world = compose(parent, *local);
       if (!std::all_of(world.begin(), world.end(), [](double v) { return std::abs(v) < 1e15; })) {
         return invalid(whose + ": its transform is not finite; reset it");
