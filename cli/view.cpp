@@ -67,8 +67,7 @@ absl::Status check(Options* o) {
 
 absl::Status run(const Options& o) {
   cancel_on_interrupt();
-  LL_ASSIGN_OR_RETURN(const auto viewer, view::Viewer::create(o.view));
-  return viewer->run();
+  return view::run_viewer(o.view);
 }
 
 }  // namespace

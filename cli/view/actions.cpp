@@ -52,7 +52,8 @@ absl::Status Viewer::act(const Action& action) {
       bake_.cancel();
       return absl::OkStatus();
     case Verb::kReload:
-      return bake_.running() ? absl::FailedPreconditionError("a bake is running; cancel it, or wait for it") : reload();
+      return bake_.running() ? absl::FailedPreconditionError("a bake is running; cancel it, or wait for it")
+                             : reload(baked_);
     case Verb::kWait:
       wait_frames_ = static_cast<int>(action.numbers[0]);
       return absl::OkStatus();

@@ -63,8 +63,8 @@ absl::Status LiveLevel::start() {
 }
 
 absl::Status LiveLevel::make_renderer() {
-  renderer_.reset();
-  LL_ASSIGN_OR_RETURN(renderer_, renderer::Renderer::create(gpu_, scene(), elements_.layout, shadow_size_));
+  LL_ASSIGN_OR_RETURN(auto fresh, renderer::Renderer::create(gpu_, scene(), elements_.layout, shadow_size_));
+  renderer_ = std::move(fresh);  // after a failure there is still the old one
   renderer_->use_irradiance(runtime_->outputs().image_view, VK_IMAGE_LAYOUT_GENERAL);
   ++generation_;
   return absl::OkStatus();

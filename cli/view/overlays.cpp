@@ -29,7 +29,7 @@ void tint(const SurfaceElements& elements, const ElementOwners& owners, const Co
 
 Rgba stale_colour(const CellEntry& cell, float worst, uint8_t alpha) {
   if (!(cell.stale > 0)) return {60, 200, 90, alpha};
-  return heat(0.5f + 0.5f * cell.stale / worst, alpha);
+  return heat(0.75f + 0.25f * cell.stale / worst, alpha);
 }
 
 void add_cells(const Manifest& manifest, const SurfaceElements& elements, const ElementOwners& owners, Marks* marks) {

@@ -123,6 +123,9 @@ void bake(const LiveLevel& level, const State& state, const std::string& save_as
   ImGui::SameLine();
   if (!state.baking) {
     if (ImGui::Button("rebake")) actions->push_back({Verb::kRebake});
+    ImGui::SameLine();
+    if (ImGui::Button("reload")) actions->push_back({Verb::kReload});
+    if (ImGui::IsItemHovered()) ImGui::SetTooltip("as it was loaded, or baked last");
     return;
   }
   if (ImGui::Button("cancel")) actions->push_back({Verb::kCancelBake});

@@ -24,8 +24,17 @@ double smoothed(double old, double now) { return old > 0 ? old + 0.1 * (now - ol
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<Viewer>> Viewer::create(ViewOptions options) {
-  std::unique_ptr<Viewer> viewer(new Viewer(std::move(options)));
+absl::Status run_viewer(const ViewOptions& options) {
+  std::vector<std::string> messages;
+  {
+    LL_ASSIGN_OR_RETURN(const auto viewer, Viewer::create(options, &messages));
+    LL_RETURN_IF_ERROR(viewer->run());
+  }
+  return messages.empty() ? absl::OkStatus() : absl::InternalError("Vulkan validation: " + messages.front());
+}
+
+absl::StatusOr<std::unique_ptr<Viewer>> Viewer::create(ViewOptions options, std::vector<std::string>* messages) {
+  std::unique_ptr<Viewer> viewer(new Viewer(std::move(options), messages));
   LL_RETURN_IF_ERROR(viewer->start());
   return viewer;
 }
@@ -34,8 +43,8 @@ absl::Status Viewer::start() {
   const std::string title = "lightloom: " + printable(std::filesystem::path(options_.files.scene).filename().string());
   LL_ASSIGN_OR_RETURN(window_, Window::create(title, options_.width, options_.height));
   const renderer::WindowSystem system = window_->system();
-  LL_ASSIGN_OR_RETURN(gpu_, renderer::Gpu::create(options_.validation, &messages_, &system));
-  saved_ = options_.files.scene;
+  LL_ASSIGN_OR_RETURN(gpu_, renderer::Gpu::create(options_.validation, messages_, &system));
+  saved_ = baked_ = options_.files.scene;
   LL_ASSIGN_OR_RETURN(level_, LiveLevel::load(gpu_.get(), options_.files, static_cast<uint32_t>(options_.shadow_size)));
   LL_ASSIGN_OR_RETURN(screen_, Screen::create(window_.get(), gpu_.get()));
   if (!options_.panel) state_.overlays.clear();
@@ -57,12 +66,13 @@ absl::Status Viewer::begin_at_camera() {
   return absl::OkStatus();
 }
 
-absl::Status Viewer::reload() {
+absl::Status Viewer::reload(const std::string& scene) {
   LevelFiles files = options_.files;
-  files.scene = saved_;
+  files.scene = scene;
   LL_ASSIGN_OR_RETURN(auto fresh, LiveLevel::load(gpu_.get(), files, static_cast<uint32_t>(options_.shadow_size),
                                                   level_->paints(), level_->scene().lights));
   level_ = std::move(fresh);
+  saved_ = baked_ = scene;
   state_.picked.reset();
   owners_ = {};
   marks_are_old_ = true;
@@ -90,7 +100,7 @@ absl::Status Viewer::look_after_bake() {
   if (!ended) return absl::OkStatus();
   quiet_ = 0;
   absl::Status result = bake_.result();
-  if (result.ok()) result = reload();
+  if (result.ok()) result = reload(saved_);
   state_.message = result.ok() ? "baked" : std::string(result.message());
   return wait_bake_ && !absl::IsCancelled(result) ? result : absl::OkStatus();
 }

@@ -28,18 +28,21 @@ struct ViewOptions {
   bool panel = true, validation = false;
 };
 
+/// Until the window is closed, the script says so, or the process is interrupted.
+absl::Status run_viewer(const ViewOptions& options);
+
 class Viewer {
  public:
-  static absl::StatusOr<std::unique_ptr<Viewer>> create(ViewOptions options);
-  /// Until the window is closed, the script says so, or the process is interrupted.
+  /// `messages` takes what the validation layers say, also while this is destroyed; it must outlive this.
+  static absl::StatusOr<std::unique_ptr<Viewer>> create(ViewOptions options, std::vector<std::string>* messages);
   absl::Status run();
 
  private:
-  explicit Viewer(ViewOptions options) : options_(std::move(options)) {}
+  Viewer(ViewOptions options, std::vector<std::string>* messages) : options_(std::move(options)), messages_(messages) {}
   absl::Status start();
   absl::Status begin_at_camera();
   /// Scene and asset from their files; lights and colours stay as they are.
-  absl::Status reload();
+  absl::Status reload(const std::string& scene);
 
   absl::Status frame();
   absl::Status draw();
@@ -64,7 +67,7 @@ class Viewer {
 
   // Destroyed from the last to the first.
   ViewOptions options_;
-  std::vector<std::string> messages_;  ///< of the validation layers
+  std::vector<std::string>* messages_;
   std::unique_ptr<Window> window_;
   std::unique_ptr<renderer::Gpu> gpu_;
   std::unique_ptr<LiveLevel> level_;
@@ -73,6 +76,7 @@ class Viewer {
   State state_;
   ChildBake bake_;
   std::string saved_;  ///< the file that holds the level as it was loaded or saved last
+  std::string baked_;  ///< the file of which the asset was baked last
   ElementOwners owners_;
   bool marks_are_old_ = true;
 

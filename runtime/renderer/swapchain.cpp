@@ -56,6 +56,10 @@ absl::StatusOr<Swapchain> Swapchain::create(const Gpu* gpu) {
   return s;
 }
 
+Swapchain::~Swapchain() {
+  if (chain_.get() != VK_NULL_HANDLE) vkDeviceWaitIdle(gpu_->device());
+}
+
 absl::StatusOr<bool> Swapchain::resize(uint32_t width, uint32_t height) {
   vkDeviceWaitIdle(gpu_->device());  // what is presented, too
   VkSurfaceCapabilitiesKHR can{};

@@ -14,7 +14,9 @@ class Swapchain {
   /// For the window that `gpu` was made with, which must outlive this. Without images until resize().
   static absl::StatusOr<Swapchain> create(const Gpu* gpu);
   Swapchain(Swapchain&&) = default;
-  Swapchain& operator=(Swapchain&&) = default;
+  Swapchain& operator=(Swapchain&&) = delete;
+  /// Waits until nothing is presented any more.
+  ~Swapchain();
 
   /// Of pictures that record_copy() takes: 8 bits, encoded as sRGB by whoever draws them.
   VkFormat picture_format() const { return picture_format_; }

@@ -157,6 +157,15 @@ TEST_F(ViewWindow, EditsAreSavedBakedAndShown) {
   EXPECT_LT(difference(shot("same.png"), shot("render.png")), 0.5);
 }
 
+TEST_F(ViewWindow, ReloadDropsWhatWasEdited) {
+  loom_ = baked();
+  views("screenshot first.png\npick \"tall box\"\nmove 1 0 -1\nsave " + path("moved.glb") +
+            "\nwait 4\nscreenshot moved.png\nreload\nwait 16\nscreenshot again.png\nquit\n",
+        {"--no-panel"});
+  EXPECT_GT(difference(shot("first.png"), shot("moved.png")), 2);
+  EXPECT_LT(difference(shot("first.png"), shot("again.png")), 0.5);
+}
+
 TEST_F(ViewWindow, ACancelledBakeLeavesTheAssetAsItWas) {
   loom_ = baked();
   views("pick \"tall box\"\nmove 0.5 0 0\nrebake\ncancel-bake\nwait-bake\nquit\n", {"--no-panel"});
