@@ -14,7 +14,8 @@ namespace lightloom::view {
 namespace {
 
 /// Light of a lamp needs some bounces to be there; only then is a picture's brightness worth measuring.
-constexpr int kSettle = 16;
+constexpr int kSettle = 16, kExposeEvery = 5;  // so the first frame and the last are among those measured
+static_assert((kSettle - 1) % kExposeEvery == 0);
 /// Frames without news, after which the viewer sleeps until some come.
 constexpr int kQuiet = 90;
 /// Frames to draw then, for the panel to follow the mouse.
@@ -187,7 +188,8 @@ absl::Status Viewer::draw() {
 
 absl::Status Viewer::expose_anew() {
   --exposing_;
-  if (options_.exposure > 0) return absl::OkStatus();
+  // Reading the picture back takes its time: not in every frame.
+  if (options_.exposure > 0 || exposing_ % kExposeEvery != 0) return absl::OkStatus();
   LL_ASSIGN_OR_RETURN(Image image, level_->renderer().read());
   state_.exposure = expose(&image);
   return absl::OkStatus();
