@@ -17,6 +17,15 @@ int index_of(const char* const (&names)[N], const std::string& name) {
   return static_cast<int>(std::find(std::begin(names), std::end(names), name) - std::begin(names));
 }
 
+/// The light or camera that is meant; null if there is none.
+template <class Items>
+auto* chosen(Items& items, const Action& action) {
+  for (size_t i = 0; i < items.size(); ++i) {
+    if (action.index < 0 ? items[i].name == action.name : i == static_cast<size_t>(action.index)) return &items[i];
+  }
+  return static_cast<decltype(&items[0])>(nullptr);
+}
+
 /// lightloom-0001.png, or the next number that no file has.
 std::string free_name() {
   std::error_code ignored;
@@ -74,7 +83,7 @@ absl::Status Viewer::show(const Action& action) {
       state_.camera.stand(action.vec3(), action.numbers[3], action.numbers[4]);
       return absl::OkStatus();
     case Verb::kCameraNamed:
-      return go_to(action.name);
+      return go_to(action);
     case Verb::kOverlay:
       marks_are_old_ = true;
       if (action.on) {
@@ -103,28 +112,24 @@ absl::Status Viewer::show(const Action& action) {
   }
 }
 
-absl::Status Viewer::go_to(const std::string& name) {
-  for (const Camera& camera : level_->scene().cameras) {
-    if (camera.name != name) continue;
-    state_.camera.stand(camera);
-    return absl::OkStatus();
-  }
-  return absl::NotFoundError("the level has no camera '" + printable(name) + "'");
+absl::Status Viewer::go_to(const Action& action) {
+  const Camera* const camera = chosen(level_->scene().cameras, action);
+  if (!camera) return absl::NotFoundError("the level has no camera '" + printable(action.name) + "'");
+  state_.camera.stand(*camera);
+  return absl::OkStatus();
 }
 
 absl::Status Viewer::act_on_light(const Action& action) {
-  for (Light& light : level_->lights()) {
-    if (light.name != action.name) continue;
-    if (action.verb == Verb::kLightColour) light.color = action.vec3();
-    if (action.verb == Verb::kLightPower) light.intensity = action.numbers[0];
-    if (action.verb != Verb::kLight) return absl::OkStatus();
-    if (light.type == LightType::kDirectional) {
-      return absl::InvalidArgumentError("a directional light has no position to move");
-    }
-    light.position = action.vec3();
-    return absl::OkStatus();
+  Light* const light = chosen(level_->lights(), action);
+  if (!light) return absl::NotFoundError("the level has no light '" + printable(action.name) + "'");
+  if (action.verb == Verb::kLightColour) light->color = action.vec3();
+  if (action.verb == Verb::kLightPower) light->intensity = action.numbers[0];
+  if (action.verb != Verb::kLight) return absl::OkStatus();
+  if (light->type == LightType::kDirectional) {
+    return absl::InvalidArgumentError("a directional light has no position to move");
   }
-  return absl::NotFoundError("the level has no light '" + printable(action.name) + "'");
+  light->position = action.vec3();
+  return absl::OkStatus();
 }
 
 absl::Status Viewer::pick(const Action& action) {

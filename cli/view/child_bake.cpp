@@ -27,6 +27,7 @@ int spawn(pid_t* child, std::vector<std::string> command, int to) {
   posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
   posix_spawn_file_actions_adddup2(&actions, to, STDERR_FILENO);
   std::vector<char*> argv;
+  argv.reserve(command.size() + 1);
   for (std::string& word : command) argv.push_back(word.data());
   argv.push_back(nullptr);
   const int error = ::posix_spawn(child, argv[0], &actions, nullptr, argv.data(), environ);

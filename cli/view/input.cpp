@@ -101,7 +101,7 @@ void Input::drag(const LiveLevel& level, const Camera& camera, Vec2 from, Vec2 t
     case Grip::kLight: {
       const Light& light = level.scene().lights[light_];
       const Vec3 there = light.position + drag_in_view(camera, light.position, from, to);
-      actions->push_back({Verb::kLight, light.name, values(there)});
+      actions->push_back({Verb::kLight, light.name, values(there), false, static_cast<int>(light_)});
       break;
     }
     case Grip::kObject:

@@ -149,9 +149,9 @@ absl::Status LiveLevel::move(size_t object, Vec3 offset) {
     Object& other = level_.scene->objects[o];
     if (!exists(o) || std::find(moved.begin(), moved.end(), other.node) == moved.end()) continue;
     for (Vec3& p : other.positions) p += offset;
-    for (int axis = 0; axis < 3; ++axis) {
-      other.transform[static_cast<size_t>(12 + axis)] += static_cast<double>(offset[axis]);
-    }
+    other.transform[12] += static_cast<double>(offset.x);
+    other.transform[13] += static_cast<double>(offset.y);
+    other.transform[14] += static_cast<double>(offset.z);
     LL_RETURN_IF_ERROR(renderer_->update_object(o));
   }
   edited_ = tracer_is_old_ = true;

@@ -17,6 +17,11 @@ using Actions = std::vector<Action>;
 
 void show_text(const std::string& text) { ImGui::TextWrapped("%s", text.c_str()); }
 
+/// What has no name goes by its number.
+std::string label(const std::string& name, const char* kind, int index) {
+  return name.empty() ? kind + std::string(" ") + std::to_string(index + 1) : name;
+}
+
 void cameras(const LiveLevel& level, const State& state, Actions* actions) {
   if (!ImGui::CollapsingHeader("Camera", ImGuiTreeNodeFlags_DefaultOpen)) return;
   const Vec3 p = state.camera.position();
@@ -24,8 +29,12 @@ void cameras(const LiveLevel& level, const State& state, Actions* actions) {
               static_cast<double>(p.z), static_cast<double>(state.camera.yaw_degrees()),
               static_cast<double>(state.camera.pitch_degrees()));
   ImGui::Text("%.1f m/s (wheel; shift: faster)", static_cast<double>(state.speed));
-  for (const Camera& camera : level.scene().cameras) {
-    if (ImGui::Selectable(camera.name.c_str())) actions->push_back({Verb::kCameraNamed, camera.name});
+  const std::vector<Camera>& all = level.scene().cameras;
+  for (int i = 0; i < static_cast<int>(all.size()); ++i) {
+    ImGui::PushID(i);
+    const std::string name = label(all[static_cast<size_t>(i)].name, "camera", i);
+    if (ImGui::Selectable(name.c_str())) actions->push_back({Verb::kCameraNamed, name, {}, false, i});
+    ImGui::PopID();
   }
 }
 
@@ -57,29 +66,31 @@ void overlays(const State& state, Actions* actions) {
   }
 }
 
-void light(const Light& light, Actions* actions) {
+void light(const Light& light, int index, Actions* actions) {
   std::array<float, 3> p{light.position.x, light.position.y, light.position.z};
   if (light.type != LightType::kDirectional && ImGui::DragFloat3("position", p.data(), 0.02f, 0, 0, "%.2f")) {
-    actions->push_back({Verb::kLight, light.name, {p[0], p[1], p[2]}});
+    actions->push_back({Verb::kLight, light.name, {p[0], p[1], p[2]}, false, index});
   }
   std::array<float, 3> c{light.color.x, light.color.y, light.color.z};
   if (ImGui::ColorEdit3("colour", c.data(), ImGuiColorEditFlags_Float | ImGuiColorEditFlags_HDR)) {
     for (float& v : c) v = std::max(v, 0.0f);
-    actions->push_back({Verb::kLightColour, light.name, {c[0], c[1], c[2]}});
+    actions->push_back({Verb::kLightColour, light.name, {c[0], c[1], c[2]}, false, index});
   }
   float power = light.intensity;
   const char* unit = light.type == LightType::kDirectional ? "%.3g W/m2" : "%.3g W/sr";
   if (ImGui::DragFloat("power", &power, std::max(0.01f, power * 0.01f), 0, 1e6f, unit)) {
-    actions->push_back({Verb::kLightPower, light.name, {std::max(power, 0.0f)}});
+    actions->push_back({Verb::kLightPower, light.name, {std::max(power, 0.0f)}, false, index});
   }
 }
 
 void lights(const LiveLevel& level, Actions* actions) {
   if (!ImGui::CollapsingHeader("Lights", ImGuiTreeNodeFlags_DefaultOpen)) return;
-  for (const Light& l : level.scene().lights) {
-    ImGui::PushID(&l);
-    if (ImGui::TreeNode("light", "%s", l.name.c_str())) {
-      light(l, actions);
+  const std::vector<Light>& all = level.scene().lights;
+  for (int i = 0; i < static_cast<int>(all.size()); ++i) {
+    const Light& l = all[static_cast<size_t>(i)];
+    ImGui::PushID(i);
+    if (ImGui::TreeNode("light", "%s", label(l.name, "light", i).c_str())) {
+      light(l, i, actions);
       ImGui::TreePop();
     }
     ImGui::PopID();

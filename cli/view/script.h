@@ -42,6 +42,7 @@ struct Action {
   std::string name = "";  ///< of a light, object, camera, overlay, layer or file
   std::vector<float> numbers = {};
   bool on = false;  ///< kOverlay
+  int index = -1;   ///< by hand: of the light or camera, whose name need not be its own; -1: by name
   int line = 0;     ///< of the script; 0: not from one
 
   Vec3 vec3() const { return {numbers[0], numbers[1], numbers[2]}; }

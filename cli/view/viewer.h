@@ -59,7 +59,7 @@ class Viewer {
   absl::Status act_on_object(const Action& action);
   absl::Status edit(const Action& action);
   absl::Status show(const Action& action);
-  absl::Status go_to(const std::string& camera);
+  absl::Status go_to(const Action& action);
   absl::Status pick(const Action& action);
   absl::Status save(const std::string& path);
   absl::Status rebake();

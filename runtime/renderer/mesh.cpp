@@ -87,6 +87,7 @@ std::vector<VertexRun> object_vertices(const Scene& scene, const AtlasLayout& la
     for (const Vertex& v : corners_of(scene, layout, object, i)) run.vertices.push_back(v);
   }
   std::vector<VertexRun> out;
+  out.reserve(runs.size());
   for (auto& [material, run] : runs) out.push_back(std::move(run));
   return out;
 }

@@ -249,7 +249,7 @@ absl::Status Renderer::set_view(const Camera& camera, Layer layer) {
 absl::Status Renderer::record(VkCommandBuffer commands,
                               const std::function<absl::Status(VkCommandBuffer)>& between) const {
   record_shadows(commands);
-  const absl::Status status = between ? between(commands) : absl::OkStatus();
+  absl::Status status = between ? between(commands) : absl::OkStatus();
   if (!status.ok()) {
     drawn_.reset();  // nothing of this will run
     return status;
