@@ -31,7 +31,7 @@ namespace {
 struct Options {
   std::string scene, output;
   BakeOptions how;
-  bool fresh = false, explain = false, dry_run = false;
+  bool fresh = false, explain = false, dry_run = false, progress = false;
   float tolerance = 0;
   int threads = 0;
   FarmOptions farm;  // its server empty: on this machine
@@ -210,6 +210,7 @@ absl::Status run(const Options& o) {
   if (!o.farm.server.empty()) return run_on_farm(o, params, earlier ? &*earlier : nullptr);
 
   ProgressBar bar;
+  if (o.progress) bar.print_lines();
   BakeControl control;
   control.threads = o.threads;
   control.cancel = &interrupted();
@@ -246,6 +247,7 @@ Command bake_command() {
                      &o->tolerance});
   options.push_back({"--dry-run", "bake nothing: print what there is to bake", &o->dry_run});
   options.push_back({"--explain", "print why each cell is baked", &o->explain});
+  options.push_back({"--progress", "print lines 'progress STAGE DONE TOTAL' on stderr, for programs", &o->progress});
   options.push_back({"--threads", "0: one per hardware thread", &o->threads});
   Option server = o->farm.server_option(/*required=*/false);
   server.help += ", which bakes it; empty: this machine does";

@@ -20,6 +20,7 @@ Command render_command();
 Command set_priority_command();
 Command submit_command();
 Command verify_command();
+Command view_command();
 Command watch_command();
 Command workers_command();
 

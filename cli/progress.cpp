@@ -85,6 +85,11 @@ void ProgressBar::draw(const std::string& stage, uint64_t done, uint64_t total, 
     return;
   }
   last_ = now;
+  if (lines_) {
+    std::fprintf(stderr, "progress %s %llu %llu\n", stage.c_str(), static_cast<unsigned long long>(done),
+                 static_cast<unsigned long long>(total));
+    return;
+  }
   if (!on_ || total == 0) return;
   const double share = static_cast<double>(done) / static_cast<double>(total);
   constexpr int kWidth = 20;

@@ -1,4 +1,4 @@
-// A progress bar with rate and ETA on a terminal; silent elsewhere.
+// A progress bar with rate and ETA on a terminal; elsewhere silent, or lines for a program that asked for them.
 #pragma once
 
 #include <chrono>
@@ -25,6 +25,8 @@ class ProgressBar {
   ProgressBar();
   ~ProgressBar() { finish(); }
 
+  /// From now on "progress STAGE DONE TOTAL" lines on stderr in place of a bar.
+  void print_lines() { lines_ = true; }
   /// Whether there is a terminal to draw on.
   bool on() const { return on_; }
   /// Shows `done` of `total` of `stage`, its time, and the rate of `rays` since it began. Redraws ten times a second at
@@ -39,6 +41,7 @@ class ProgressBar {
  private:
   using Clock = std::chrono::steady_clock;
   bool on_;
+  bool lines_ = false;
   bool drawn_ = false;
   std::string stage_;
   Eta eta_;

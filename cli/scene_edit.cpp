@@ -3,7 +3,6 @@
 #include <absl/strings/str_cat.h>
 
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <map>
 #include <sstream>
@@ -18,22 +17,8 @@ std::vector<std::string> split(const std::string& text, char at) {
   return parts;
 }
 
-/// A copy of each of the object's materials, changed, used by nobody else.
-void own_materials(Object* object, Scene* scene, const std::function<void(Material*)>& change) {
-  std::map<uint32_t, uint32_t> own;
-  for (Triangle& t : object->triangles) {
-    const auto [it, added] = own.try_emplace(t.material, static_cast<uint32_t>(scene->materials.size()));
-    if (added) {
-      Material copy = scene->materials[t.material];
-      change(&copy);
-      scene->materials.push_back(std::move(copy));
-    }
-    t.material = it->second;
-  }
-}
-
 absl::Status edit_objects(const std::string& option, const std::string& edits, float greatest, Scene* scene,
-                          const std::function<void(Material*, Vec3)>& change) {
+                          void (*change)(Vec3, Material*)) {
   for (const std::string& edit : split(edits, ';')) {
     const size_t colon = edit.rfind(':');
     if (colon == std::string::npos) {
@@ -51,7 +36,8 @@ absl::Status edit_objects(const std::string& option, const std::string& edits, f
     for (Object& object : scene->objects) {
       if (object.name != name) continue;
       found = true;
-      own_materials(&object, scene, [&](Material* m) { change(m, value); });
+      own_materials(&object, scene);
+      for (const Triangle& t : object.triangles) change(value, &scene->materials[t.material]);
     }
     if (!found) return absl::NotFoundError(absl::StrCat(option, ": the scene has no object '", name, "'"));
   }
@@ -72,20 +58,35 @@ absl::StatusOr<Vec3> parse_vec3(const std::string& text) {
   return v;
 }
 
+void own_materials(Object* object, Scene* scene) {
+  std::map<uint32_t, uint32_t> own;
+  for (Triangle& t : object->triangles) {
+    const auto [it, added] = own.try_emplace(t.material, static_cast<uint32_t>(scene->materials.size()));
+    if (added) {
+      Material copy = scene->materials[t.material];
+      scene->materials.push_back(std::move(copy));
+    }
+    t.material = it->second;
+  }
+}
+
+void paint(Vec3 albedo, Material* m) {
+  m->base_color = albedo;
+  // The texture of a masked material holds the mask, which is geometry: it stays and is multiplied.
+  if (m->alpha_mode != AlphaMode::kMask) m->base_color_texture = -1;
+}
+
+void shine(Vec3 radiance, Material* m) {
+  m->emission = radiance;
+  m->emission_texture = -1;
+}
+
 absl::Status set_albedo(const std::string& edits, Scene* scene) {
-  return edit_objects("--set-albedo", edits, 1, scene, [](Material* m, Vec3 albedo) {
-    m->base_color = albedo;
-    // The texture of a masked material holds the mask, which is geometry: it stays and is multiplied.
-    if (m->alpha_mode != AlphaMode::kMask) m->base_color_texture = -1;
-  });
+  return edit_objects("--set-albedo", edits, 1, scene, paint);
 }
 
 absl::Status set_emission(const std::string& edits, Scene* scene) {
-  return edit_objects("--set-emission", edits, std::numeric_limits<float>::max(), scene,
-                      [](Material* m, Vec3 radiance) {
-                        m->emission = radiance;
-                        m->emission_texture = -1;
-                      });
+  return edit_objects("--set-emission", edits, std::numeric_limits<float>::max(), scene, shine);
 }
 
 absl::StatusOr<LightPath> LightPath::parse(const std::string& light, const std::string& points, const Scene& scene) {

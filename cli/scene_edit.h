@@ -17,6 +17,12 @@ absl::StatusOr<Vec3> parse_vec3(const std::string& text);
 absl::Status set_albedo(const std::string& edits, Scene* scene);
 absl::Status set_emission(const std::string& edits, Scene* scene);
 
+/// The object's materials become its own: whatever changes them changes nothing else.
+void own_materials(Object* object, Scene* scene);
+/// What set_albedo and set_emission do to a material.
+void paint(Vec3 albedo, Material* material);
+void shine(Vec3 radiance, Material* material);
+
 /// A light on its way along a path of straight lines, at constant speed.
 class LightPath {
  public:

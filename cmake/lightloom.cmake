@@ -37,7 +37,15 @@ find_package(CLI11 CONFIG REQUIRED)
 find_package(Vulkan REQUIRED)
 find_package(ZLIB REQUIRED)
 find_package(SQLite3 REQUIRED)
+find_package(glfw3 3.3 CONFIG REQUIRED)
 find_program(GRPC_CPP_PLUGIN grpc_cpp_plugin REQUIRED)
+
+# Dear ImGui comes without a CMake package, and takes its fonts from stb.
+find_library(IMGUI_LIBRARY imgui REQUIRED)
+find_path(IMGUI_INCLUDE imgui.h PATH_SUFFIXES imgui REQUIRED)
+add_library(imgui STATIC IMPORTED)
+set_target_properties(imgui PROPERTIES IMPORTED_LOCATION ${IMGUI_LIBRARY} INTERFACE_INCLUDE_DIRECTORIES ${IMGUI_INCLUDE}
+  INTERFACE_LINK_LIBRARIES "stb;glfw;Vulkan::Vulkan")
 
 # lightloom_flavour(<name> [PIC] [OPTIONS <flag>...] [HEADERS <header>...])
 # One way to compile, and what nearly every file reads, compiled once for it: the headers below, and HEADERS. GCC takes

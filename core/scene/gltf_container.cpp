@@ -177,6 +177,41 @@ std::string one_line(std::string text) {
 
 }  // namespace
 
+absl::StatusOr<GltfParts> gltf_parts(const std::vector<uint8_t>& file) {
+  const bool binary = file.size() >= 4 && std::memcmp(file.data(), "glTF", 4) == 0;
+  GltfParts parts;
+  parts.json = {reinterpret_cast<const char*>(file.data()), file.size()};
+  if (!binary) return parts;
+  LL_ASSIGN_OR_RETURN(parts.json, json_chunk(file));
+  const size_t header = 20 + parts.json.size();
+  if (header < u32_at(file, 8)) parts.binary = std::span(file).subspan(header + 8, u32_at(file, header));
+  return parts;
+}
+
+absl::StatusOr<std::vector<uint8_t>> glb_bytes(std::string json, std::span<const uint8_t> binary) {
+  json.resize((json.size() + 3) / 4 * 4, ' ');
+  const size_t padded = (binary.size() + 3) / 4 * 4;
+  const uint64_t total = 12 + 8 + json.size() + (binary.empty() ? 0 : 8 + padded);
+  if (total > 0xffffffffu) return absl::InvalidArgumentError("is larger than the 4 GiB of a .glb; split the level");
+  std::vector<uint8_t> out;
+  out.reserve(total);
+  const auto u32 = [&](uint64_t v) {
+    for (int shift = 0; shift < 32; shift += 8) out.push_back(static_cast<uint8_t>(v >> shift));
+  };
+  u32(0x46546c67);
+  u32(2);
+  u32(total);
+  u32(json.size());
+  u32(0x4e4f534a);
+  out.insert(out.end(), json.begin(), json.end());
+  if (binary.empty()) return out;
+  u32(padded);
+  u32(0x004e4942);
+  out.insert(out.end(), binary.begin(), binary.end());
+  out.resize(total, 0);
+  return out;
+}
+
 absl::StatusOr<std::unique_ptr<tinygltf::Model>> read_gltf_model(const fs::path& path) {
   std::error_code code;
   if (fs::exists(path, code) && !fs::is_regular_file(path, code)) {
@@ -188,11 +223,9 @@ absl::StatusOr<std::unique_ptr<tinygltf::Model>> read_gltf_model(const fs::path&
   LL_ASSIGN_OR_RETURN(const std::vector<uint8_t> data, read_file(path));
   if (data.empty()) return absl::InvalidArgumentError("is empty; export it again");
 
-  const bool binary = data.size() >= 4 && std::memcmp(data.data(), "glTF", 4) == 0;
-  std::string_view json(reinterpret_cast<const char*>(data.data()), data.size());
-  if (binary) {
-    LL_ASSIGN_OR_RETURN(json, json_chunk(data));
-  }
+  LL_ASSIGN_OR_RETURN(const GltfParts parts, gltf_parts(data));
+  const std::string_view json = parts.json;
+  const bool binary = json.data() != reinterpret_cast<const char*>(data.data());
   LL_RETURN_IF_ERROR(check_json_size(json));
 
   auto model = std::make_unique<tinygltf::Model>();

@@ -14,52 +14,13 @@
 #include "core/scene/gltf_container.h"
 #include "core/scene/gltf_material.h"
 #include "core/scene/gltf_mesh.h"
+#include "core/scene/gltf_transform.h"
 #include "core/scene/gltf_warnings.h"
 
 namespace lightloom {
 namespace {
 
 absl::Status invalid(std::string message) { return absl::InvalidArgumentError(std::move(message)); }
-
-/// A node's own transform: its matrix, or T·R·S (glTF 2.0, 3.5.3).
-absl::StatusOr<Transform> local_transform(const tinygltf::Node& node, const std::string& whose) {
-  const auto sized = [](const std::vector<double>& v, size_t n) { return v.empty() || v.size() == n; };
-  if (!sized(node.matrix, 16) || !sized(node.translation, 3) || !sized(node.rotation, 4) || !sized(node.scale, 3)) {
-    return invalid(whose + ": its transform has the wrong number of values; export the file again");
-  }
-  Transform m = kIdentity;
-  if (!node.matrix.empty()) {
-    std::copy(node.matrix.begin(), node.matrix.end(), m.begin());
-    return m;
-  }
-  if (!node.rotation.empty()) {
-    const auto& q = node.rotation;
-    const double square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
-    if (!(square > 1e-12)) return invalid(whose + ": its rotation is not a unit quaternion; export the file again");
-    const double s = 2 / square, x = q[0], y = q[1], z = q[2], w = q[3];
-    m = {1 - s * (y * y + z * z),
-         s * (x * y + z * w),
-         s * (x * z - y * w),
-         0,
-         s * (x * y - z * w),
-         1 - s * (x * x + z * z),
-         s * (y * z + x * w),
-         0,
-         s * (x * z + y * w),
-         s * (y * z - x * w),
-         1 - s * (x * x + y * y),
-         0,
-         0,
-         0,
-         0,
-         1};
-  }
-  for (size_t column = 0; column < 3; ++column) {
-    for (size_t row = 0; row < 3 && !node.scale.empty(); ++row) m[4 * column + row] *= node.scale[column];
-    if (!node.translation.empty()) m[12 + column] = node.translation[column];
-  }
-  return m;
-}
 
 Vec3 axis(const Transform& m, size_t column, double sign = 1) {
   return unit({sign * m[4 * column], sign * m[4 * column + 1], sign * m[4 * column + 2]});
@@ -122,8 +83,9 @@ class Loader {
       if (visited[i]) return invalid(whose + " is reached twice: nodes must form trees; export the file again");
       visited[i] = true;
 
-      LL_ASSIGN_OR_RETURN(const Transform local, local_transform(node, whose));
-      const Transform world = compose(parent, local);
+      const auto local = local_transform(node.matrix, node.translation, node.rotation, node.scale);
+      if (!local.ok()) return invalid(whose + ": " + std::string(local.status().message()));
+      const Transform world = compose(parent, *local);
       if (!std::all_of(world.begin(), world.end(), [](double v) { return std::abs(v) < 1e15; })) {
         return invalid(whose + ": its transform is not finite; reset it");
       }
@@ -150,6 +112,7 @@ class Loader {
     Object object;
     object.name = object_name(node.name, index);
     object.transform = world;
+    object.node = index;
     LL_RETURN_IF_ERROR(read_extras(node.extras, whose, &object));
     LL_RETURN_IF_ERROR(meshes_.read(node.mesh, &object));
     if (node.skin >= 0) warnings_.add("nodes had skins, which were ignored", object.name);

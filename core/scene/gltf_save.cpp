@@ -10,6 +10,7 @@
 #include "core/base/text.h"
 #include "core/scene/affine.h"
 #include "core/scene/gltf.h"
+#include "core/scene/gltf_container.h"
 
 namespace lightloom {
 namespace {
@@ -49,29 +50,7 @@ class Writer {
     return absl::OkStatus();
   }
 
-  /// Header, JSON chunk, BIN chunk (glTF 2.0, 4.4).
-  absl::StatusOr<std::vector<uint8_t>> glb() const {
-    std::string json = root_.dump();
-    json.resize((json.size() + 3) / 4 * 4, ' ');
-    const uint64_t total = 12 + 8 + json.size() + (bin_.empty() ? 0 : 8 + bin_.size());
-    if (total > 0xffffffffu) return absl::InvalidArgumentError("is larger than the 4 GiB of a .glb; split the level");
-    std::vector<uint8_t> out;
-    out.reserve(total);
-    const auto u32 = [&](uint64_t v) {
-      for (int shift = 0; shift < 32; shift += 8) out.push_back(static_cast<uint8_t>(v >> shift));
-    };
-    u32(0x46546c67);
-    u32(2);
-    u32(total);
-    u32(json.size());
-    u32(0x4e4f534a);
-    out.insert(out.end(), json.begin(), json.end());
-    if (bin_.empty()) return out;
-    u32(bin_.size());
-    u32(0x004e4942);
-    out.insert(out.end(), bin_.begin(), bin_.end());
-    return out;
-  }
+  absl::StatusOr<std::vector<uint8_t>> glb() const { return glb_bytes(root_.dump(), bin_); }
 
  private:
   bool uses(const std::string& extension) const {

@@ -65,6 +65,7 @@ struct Object {
   Transform transform{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
   uint32_t ordinal = 0;  ///< 0, 1, … among objects equal in mesh_hash and transform
   Digest id;             ///< of (mesh_hash, transform, ordinal): what receivers are keyed by
+  int node = -1;         ///< of the glTF file it was read from
 
   std::vector<Vec3> positions;  ///< world space
   std::vector<Vec3> normals;    ///< world space, unit; one per vertex

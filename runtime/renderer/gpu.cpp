@@ -16,19 +16,6 @@ VKAPI_ATTR VkBool32 VKAPI_CALL on_message(VkDebugUtilsMessageSeverityFlagBitsEXT
   return VK_FALSE;
 }
 
-/// The family whose queues draw and compute, or -1.
-int graphics_family(VkPhysicalDevice physical) {
-  uint32_t count = 0;
-  vkGetPhysicalDeviceQueueFamilyProperties(physical, &count, nullptr);
-  std::vector<VkQueueFamilyProperties> families(count);
-  vkGetPhysicalDeviceQueueFamilyProperties(physical, &count, families.data());
-  constexpr VkQueueFlags kBoth = VK_QUEUE_GRAPHICS_BIT | VK_QUEUE_COMPUTE_BIT;
-  for (uint32_t f = 0; f < count; ++f) {
-    if ((families[f].queueFlags & kBoth) == kBoth) return static_cast<int>(f);
-  }
-  return -1;
-}
-
 int rank(VkPhysicalDeviceType type) {
   switch (type) {
     case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU:
@@ -67,15 +54,20 @@ void make_levels(VkCommandBuffer commands, const Texture2D& texture) {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<Gpu>> Gpu::create(bool validation, std::vector<std::string>* messages) {
+absl::StatusOr<std::unique_ptr<Gpu>> Gpu::create(bool validation, std::vector<std::string>* messages,
+                                                 const WindowSystem* window) {
   std::unique_ptr<Gpu> gpu(new Gpu);
   if (messages) gpu->messages_ = messages;
-  LL_RETURN_IF_ERROR(gpu->create_instance(validation));
+  LL_RETURN_IF_ERROR(gpu->create_instance(validation, window));
+  if (window) {
+    LL_ASSIGN_OR_RETURN(gpu->surface_, window->make_surface(gpu->instance_));
+  }
+  LL_RETURN_IF_ERROR(gpu->choose_device());
   LL_RETURN_IF_ERROR(gpu->create_device());
   return gpu;
 }
 
-absl::Status Gpu::create_instance(bool validation) {
+absl::Status Gpu::create_instance(bool validation, const WindowSystem* window) {
   auto application = vulkan_struct<VkApplicationInfo>(VK_STRUCTURE_TYPE_APPLICATION_INFO);
   application.apiVersion = VK_API_VERSION_1_3;
 
@@ -92,16 +84,19 @@ absl::Status Gpu::create_instance(bool validation) {
   messenger.pUserData = messages_;
   messenger.pNext = &features;
 
-  const char* extensions[] = {VK_EXT_DEBUG_UTILS_EXTENSION_NAME, VK_EXT_VALIDATION_FEATURES_EXTENSION_NAME};
+  std::vector<const char*> extensions;
+  if (window) extensions = window->instance_extensions;
   auto info = vulkan_struct<VkInstanceCreateInfo>(VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO);
   info.pApplicationInfo = &application;
   if (validation) {
     info.pNext = &messenger;
     info.enabledLayerCount = 1;
     info.ppEnabledLayerNames = &kValidationLayer;
-    info.enabledExtensionCount = 2;
-    info.ppEnabledExtensionNames = extensions;
+    extensions.push_back(VK_EXT_DEBUG_UTILS_EXTENSION_NAME);
+    extensions.push_back(VK_EXT_VALIDATION_FEATURES_EXTENSION_NAME);
   }
+  info.enabledExtensionCount = static_cast<uint32_t>(extensions.size());
+  info.ppEnabledExtensionNames = extensions.data();
   LL_VK_RETURN_IF_ERROR("vkCreateInstance", vkCreateInstance(&info, nullptr, &instance_));
   if (!validation) return absl::OkStatus();
   const auto create = reinterpret_cast<PFN_vkCreateDebugUtilsMessengerEXT>(
@@ -111,7 +106,25 @@ absl::Status Gpu::create_instance(bool validation) {
   return absl::OkStatus();
 }
 
-absl::Status Gpu::create_device() {
+/// The family whose queues draw and compute, and present if there is a window; or -1.
+absl::StatusOr<int> Gpu::usable_family(VkPhysicalDevice physical) const {
+  uint32_t count = 0;
+  vkGetPhysicalDeviceQueueFamilyProperties(physical, &count, nullptr);
+  std::vector<VkQueueFamilyProperties> families(count);
+  vkGetPhysicalDeviceQueueFamilyProperties(physical, &count, families.data());
+  constexpr VkQueueFlags kBoth = VK_QUEUE_GRAPHICS_BIT | VK_QUEUE_COMPUTE_BIT;
+  for (uint32_t f = 0; f < count; ++f) {
+    VkBool32 presents = VK_TRUE;
+    if (surface_ != VK_NULL_HANDLE) {
+      LL_VK_RETURN_IF_ERROR("vkGetPhysicalDeviceSurfaceSupportKHR",
+                            vkGetPhysicalDeviceSurfaceSupportKHR(physical, f, surface_, &presents));
+    }
+    if (presents && (families[f].queueFlags & kBoth) == kBoth) return static_cast<int>(f);
+  }
+  return -1;
+}
+
+absl::Status Gpu::choose_device() {
   uint32_t count = 0;
   LL_VK_RETURN_IF_ERROR("vkEnumeratePhysicalDevices", vkEnumeratePhysicalDevices(instance_, &count, nullptr));
   std::vector<VkPhysicalDevice> devices(count);
@@ -121,7 +134,7 @@ absl::Status Gpu::create_device() {
   for (const VkPhysicalDevice physical : devices) {
     VkPhysicalDeviceProperties properties;
     vkGetPhysicalDeviceProperties(physical, &properties);
-    const int family = graphics_family(physical);
+    LL_ASSIGN_OR_RETURN(const int family, usable_family(physical));
     if (family < 0 || properties.apiVersion < VK_API_VERSION_1_3) continue;
     if (physical_ != VK_NULL_HANDLE && rank(properties.deviceType) >= rank(properties_.deviceType)) continue;
     physical_ = physical;
@@ -129,13 +142,22 @@ absl::Status Gpu::create_device() {
     family_ = static_cast<uint32_t>(family);
   }
   if (physical_ == VK_NULL_HANDLE) {
+    if (surface_ != VK_NULL_HANDLE) {
+      return absl::NotFoundError(
+          "no Vulkan 1.3 device can show pictures on this display; install a driver (mesa-vulkan-drivers has a "
+          "software "
+          "one), check VK_ICD_FILENAMES, or use lightloom render");
+    }
     return absl::NotFoundError(
         "no Vulkan 1.3 device that draws among " + std::to_string(count) +
         "; install a driver (mesa-vulkan-drivers has a software one), check VK_ICD_FILENAMES, or "
         "use --device cpu");
   }
   vkGetPhysicalDeviceMemoryProperties(physical_, &memory_);
+  return absl::OkStatus();
+}
 
+absl::Status Gpu::create_device() {
   auto features =
       vulkan_struct<VkPhysicalDeviceVulkan13Features>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_3_FEATURES);
   features.dynamicRendering = VK_TRUE;
@@ -149,6 +171,9 @@ absl::Status Gpu::create_device() {
   info.pNext = &features;
   info.queueCreateInfoCount = 1;
   info.pQueueCreateInfos = &queue;
+  const char* const swapchain = VK_KHR_SWAPCHAIN_EXTENSION_NAME;
+  info.enabledExtensionCount = surface_ != VK_NULL_HANDLE ? 1 : 0;
+  info.ppEnabledExtensionNames = &swapchain;
   LL_VK_RETURN_IF_ERROR("vkCreateDevice", vkCreateDevice(physical_, &info, nullptr, &device_));
   vkGetDeviceQueue(device_, family_, 0, &queue_);
 
@@ -172,6 +197,7 @@ Gpu::~Gpu() {
     vkDestroyCommandPool(device_, pool_, nullptr);
     vkDestroyDevice(device_, nullptr);
   }
+  if (surface_ != VK_NULL_HANDLE) vkDestroySurfaceKHR(instance_, surface_, nullptr);
   if (messenger_ != VK_NULL_HANDLE) {
     const auto destroy = reinterpret_cast<PFN_vkDestroyDebugUtilsMessengerEXT>(
         vkGetInstanceProcAddr(instance_, "vkDestroyDebugUtilsMessengerEXT"));
@@ -184,7 +210,7 @@ absl::Status Gpu::validation() const {
   return messages_->empty() ? absl::OkStatus() : absl::InternalError("Vulkan validation: " + messages_->front());
 }
 
-absl::Status Gpu::run(const std::function<absl::Status(VkCommandBuffer)>& record) {
+absl::Status Gpu::run(const std::function<absl::Status(VkCommandBuffer)>& record, const Semaphores& semaphores) {
   auto begin = vulkan_struct<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
   begin.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
   LL_VK_RETURN_IF_ERROR("vkBeginCommandBuffer", vkBeginCommandBuffer(commands_, &begin));
@@ -196,6 +222,12 @@ absl::Status Gpu::run(const std::function<absl::Status(VkCommandBuffer)>& record
   auto submit = vulkan_struct<VkSubmitInfo>(VK_STRUCTURE_TYPE_SUBMIT_INFO);
   submit.commandBufferCount = 1;
   submit.pCommandBuffers = &commands_;
+  const VkPipelineStageFlags copies = VK_PIPELINE_STAGE_TRANSFER_BIT;
+  submit.waitSemaphoreCount = semaphores.wait != VK_NULL_HANDLE ? 1 : 0;
+  submit.pWaitSemaphores = &semaphores.wait;
+  submit.pWaitDstStageMask = &copies;
+  submit.signalSemaphoreCount = semaphores.signal != VK_NULL_HANDLE ? 1 : 0;
+  submit.pSignalSemaphores = &semaphores.signal;
   LL_VK_RETURN_IF_ERROR("vkQueueSubmit", vkQueueSubmit(queue_, 1, &submit, fence_));
   LL_VK_RETURN_IF_ERROR("vkWaitForFences", vkWaitForFences(device_, 1, &fence_, VK_TRUE, UINT64_MAX));
   LL_VK_RETURN_IF_ERROR("vkResetFences", vkResetFences(device_, 1, &fence_));

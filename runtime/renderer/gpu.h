@@ -69,11 +69,24 @@ struct TextureInfo {
   VkImageAspectFlags aspect = VK_IMAGE_ASPECT_COLOR_BIT;
 };
 
+/// A window to show pictures in.
+struct WindowSystem {
+  std::vector<const char*> instance_extensions;
+  std::function<absl::StatusOr<VkSurfaceKHR>(VkInstance)> make_surface;
+};
+
+/// What a submission waits for and signals, besides the fence that run() waits for.
+struct Semaphores {
+  VkSemaphore wait = VK_NULL_HANDLE;  ///< before copies
+  VkSemaphore signal = VK_NULL_HANDLE;
+};
+
 class Gpu {
  public:
   /// NotFound: no Vulkan 1.3 device with a graphics queue. `messages` takes what the validation layers say, also while
-  /// this is destroyed; it must outlive this. Null: a list of its own.
-  static absl::StatusOr<std::unique_ptr<Gpu>> create(bool validation, std::vector<std::string>* messages = nullptr);
+  /// this is destroyed; it must outlive this. Null: a list of its own. `window`: the device can present to it.
+  static absl::StatusOr<std::unique_ptr<Gpu>> create(bool validation, std::vector<std::string>* messages = nullptr,
+                                                     const WindowSystem* window = nullptr);
   ~Gpu();
   Gpu(const Gpu&) = delete;
   Gpu& operator=(const Gpu&) = delete;
@@ -83,10 +96,11 @@ class Gpu {
   VkDevice device() const { return device_; }
   VkQueue queue() const { return queue_; }
   uint32_t queue_family() const { return family_; }
+  VkSurfaceKHR surface() const { return surface_; }  ///< null without a window
   const VkPhysicalDeviceLimits& limits() const { return properties_.limits; }
 
   /// Records commands, submits them and waits for them. Fails on any message of the validation layers.
-  absl::Status run(const std::function<absl::Status(VkCommandBuffer)>& record);
+  absl::Status run(const std::function<absl::Status(VkCommandBuffer)>& record, const Semaphores& semaphores = {});
   /// What the validation layers said so far.
   absl::Status validation() const;
 
@@ -100,7 +114,9 @@ class Gpu {
 
  private:
   Gpu() = default;
-  absl::Status create_instance(bool validation);
+  absl::Status create_instance(bool validation, const WindowSystem* window);
+  absl::StatusOr<int> usable_family(VkPhysicalDevice physical) const;
+  absl::Status choose_device();
   absl::Status create_device();
   absl::StatusOr<Buffer> buffer(uint64_t bytes, VkBufferUsageFlags usage, bool host) const;
   absl::StatusOr<Owned<VkDeviceMemory>> allocate(const VkMemoryRequirements& need, bool host) const;
@@ -109,6 +125,7 @@ class Gpu {
   std::vector<std::string>* messages_ = &own_messages_;
   VkInstance instance_ = VK_NULL_HANDLE;
   VkDebugUtilsMessengerEXT messenger_ = VK_NULL_HANDLE;
+  VkSurfaceKHR surface_ = VK_NULL_HANDLE;
   VkPhysicalDevice physical_ = VK_NULL_HANDLE;
   VkPhysicalDeviceProperties properties_{};
   VkPhysicalDeviceMemoryProperties memory_{};

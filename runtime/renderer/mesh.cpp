@@ -19,6 +19,28 @@ Vec2 corner_uv(const Object& object, int set, uint32_t vertex) {
   return uv.empty() ? Vec2{2 * gpu::kNoUv, 0} : uv[vertex];
 }
 
+/// The three corners of triangle `i`.
+std::array<Vertex, 3> corners_of(const Scene& scene, const AtlasLayout& layout, size_t o, size_t i) {
+  const Object& object = scene.objects[o];
+  const Triangle& t = object.triangles[i];
+  const Material& material = scene.materials[t.material];
+  const auto& corners = layout.uv[o].corners;
+  const Vec2 origin{static_cast<float>(layout.placements[o].x), static_cast<float>(layout.placements[o].y)};
+  const Vec3 p0 = object.positions[t.v[0]];
+  const Vec3 geometric = normalize(cross(object.positions[t.v[1]] - p0, object.positions[t.v[2]] - p0));
+  std::array<Vertex, 3> out;
+  for (size_t c = 0; c < 3; ++c) {
+    Vertex& v = out[c];
+    v.position = object.positions[t.v[c]];
+    v.normal = object.normals[t.v[c]];
+    v.geometric = snorm(geometric);
+    v.base_uv = corner_uv(object, material.base_color_uv, t.v[c]);
+    v.emission_uv = corner_uv(object, material.emission_uv, t.v[c]);
+    v.lightmap_uv = corners.empty() ? Vec2{-1, -1} : corners[i][c] + origin;
+  }
+  return out;
+}
+
 }  // namespace
 
 Mesh make_mesh(const Scene& scene, const AtlasLayout& layout) {
@@ -47,25 +69,27 @@ Mesh make_mesh(const Scene& scene, const AtlasLayout& layout) {
   for (size_t o = 0; o < scene.objects.size(); ++o) {
     const Object& object = scene.objects[o];
     if (!object.is_static) continue;
-    const auto& corners = layout.uv[o].corners;
-    const Vec2 origin{static_cast<float>(layout.placements[o].x), static_cast<float>(layout.placements[o].y)};
     for (size_t i = 0; i < object.triangles.size(); ++i) {
-      const Triangle& t = object.triangles[i];
-      const Material& material = scene.materials[t.material];
-      const Vec3 p0 = object.positions[t.v[0]];
-      const Vec3 geometric = normalize(cross(object.positions[t.v[1]] - p0, object.positions[t.v[2]] - p0));
-      for (size_t c = 0; c < 3; ++c) {
-        Vertex& v = mesh.vertices[next[t.material]++];
-        v.position = object.positions[t.v[c]];
-        v.normal = object.normals[t.v[c]];
-        v.geometric = snorm(geometric);
-        v.base_uv = corner_uv(object, material.base_color_uv, t.v[c]);
-        v.emission_uv = corner_uv(object, material.emission_uv, t.v[c]);
-        v.lightmap_uv = corners.empty() ? Vec2{-1, -1} : corners[i][c] + origin;
-      }
+      const uint32_t material = object.triangles[i].material;
+      mesh.first.try_emplace({static_cast<uint32_t>(o), material}, next[material]);
+      for (const Vertex& v : corners_of(scene, layout, o, i)) mesh.vertices[next[material]++] = v;
     }
   }
   return mesh;
+}
+
+std::vector<VertexRun> object_vertices(const Scene& scene, const AtlasLayout& layout, const Mesh& mesh, size_t object) {
+  std::map<uint32_t, VertexRun> runs;
+  const std::vector<Triangle>& triangles = scene.objects[object].triangles;
+  for (size_t i = 0; scene.objects[object].is_static && i < triangles.size(); ++i) {
+    VertexRun& run = runs[triangles[i].material];
+    run.first = mesh.first.at({static_cast<uint32_t>(object), triangles[i].material});
+    for (const Vertex& v : corners_of(scene, layout, object, i)) run.vertices.push_back(v);
+  }
+  std::vector<VertexRun> out;
+  out.reserve(runs.size());
+  for (auto& [material, run] : runs) out.push_back(std::move(run));
+  return out;
 }
 
 }  // namespace lightloom::renderer

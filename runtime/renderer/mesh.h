@@ -3,6 +3,8 @@
 
 #include <array>
 #include <cstdint>
+#include <map>
+#include <utility>
 #include <vector>
 
 #include "core/receivers/layout.h"
@@ -28,8 +30,17 @@ struct Mesh {
   std::vector<Vertex> vertices;
   std::vector<DrawRange> ranges;  ///< opaque materials first
   uint32_t opaque = 0;            ///< vertices of opaque materials
+  /// Where each object's vertices of a material begin: by (object, material), for those that have some.
+  std::map<std::pair<uint32_t, uint32_t>, uint32_t> first;
 };
 
 Mesh make_mesh(const Scene& scene, const AtlasLayout& layout);
+
+/// An object's vertices of one material, as the object is now, and where they lie in the mesh.
+struct VertexRun {
+  uint64_t first = 0;
+  std::vector<Vertex> vertices;
+};
+std::vector<VertexRun> object_vertices(const Scene& scene, const AtlasLayout& layout, const Mesh& mesh, size_t object);
 
 }  // namespace lightloom::renderer

@@ -5,8 +5,8 @@
 #include <initializer_list>
 
 #include "runtime/renderer/mesh.h"
+#include "runtime/renderer/pipeline_parts.h"
 #include "runtime/renderer/shaders/frame.h"
-#include "runtime/renderer/status.h"
 
 namespace lightloom::renderer {
 namespace {
@@ -26,42 +26,7 @@ constexpr uint32_t kShadowMaskFrag[] =
 ;
 // clang-format on
 
-absl::StatusOr<Owned<VkDescriptorSetLayout>> set_layout(VkDevice device, const std::vector<VkDescriptorType>& types) {
-  std::vector<VkDescriptorSetLayoutBinding> bindings(types.size());
-  for (uint32_t b = 0; b < bindings.size(); ++b) {
-    bindings[b] = {b, types[b], 1, VK_SHADER_STAGE_VERTEX_BIT | VK_SHADER_STAGE_FRAGMENT_BIT, nullptr};
-  }
-  auto info = vulkan_struct<VkDescriptorSetLayoutCreateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO);
-  info.bindingCount = static_cast<uint32_t>(bindings.size());
-  info.pBindings = bindings.data();
-  VkDescriptorSetLayout handle = VK_NULL_HANDLE;
-  LL_VK_RETURN_IF_ERROR("vkCreateDescriptorSetLayout", vkCreateDescriptorSetLayout(device, &info, nullptr, &handle));
-  return Owned<VkDescriptorSetLayout>(device, handle, vkDestroyDescriptorSetLayout);
-}
-
-absl::StatusOr<Owned<VkPipelineLayout>> pipeline_layout(VkDevice device, std::vector<VkDescriptorSetLayout> sets,
-                                                        uint32_t push_bytes) {
-  const VkPushConstantRange push{VK_SHADER_STAGE_VERTEX_BIT | VK_SHADER_STAGE_FRAGMENT_BIT, 0, push_bytes};
-  auto info = vulkan_struct<VkPipelineLayoutCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO);
-  info.setLayoutCount = static_cast<uint32_t>(sets.size());
-  info.pSetLayouts = sets.data();
-  info.pushConstantRangeCount = 1;
-  info.pPushConstantRanges = &push;
-  VkPipelineLayout handle = VK_NULL_HANDLE;
-  LL_VK_RETURN_IF_ERROR("vkCreatePipelineLayout", vkCreatePipelineLayout(device, &info, nullptr, &handle));
-  return Owned<VkPipelineLayout>(device, handle, vkDestroyPipelineLayout);
-}
-
-absl::StatusOr<Owned<VkShaderModule>> shader(VkDevice device, std::span<const uint32_t> code) {
-  auto info = vulkan_struct<VkShaderModuleCreateInfo>(VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO);
-  info.codeSize = code.size_bytes();
-  info.pCode = code.data();
-  VkShaderModule handle = VK_NULL_HANDLE;
-  LL_VK_RETURN_IF_ERROR("vkCreateShaderModule", vkCreateShaderModule(device, &info, nullptr, &handle));
-  return Owned<VkShaderModule>(device, handle, vkDestroyShaderModule);
-}
-
-struct PipelineInfo {
+struct Stage {
   VkPipelineLayout layout;
   std::span<const uint32_t> vertex, fragment;  ///< fragment may be empty
   std::initializer_list<uint32_t> locations;   ///< of the Vertex that the shader reads
@@ -70,22 +35,7 @@ struct PipelineInfo {
 };
 
 /// Draws both sides: single-sided back faces block light and the view, too.
-absl::StatusOr<Owned<VkPipeline>> pipeline(VkDevice device, const PipelineInfo& want) {
-  LL_ASSIGN_OR_RETURN(const auto vertex, shader(device, want.vertex));
-  Owned<VkShaderModule> fragment;
-  if (!want.fragment.empty()) {
-    LL_ASSIGN_OR_RETURN(fragment, shader(device, want.fragment));
-  }
-  std::array<VkPipelineShaderStageCreateInfo, 2> stages{};
-  for (VkPipelineShaderStageCreateInfo& stage : stages) {
-    stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
-    stage.pName = "main";
-  }
-  stages[0].stage = VK_SHADER_STAGE_VERTEX_BIT;
-  stages[0].module = vertex.get();
-  stages[1].stage = VK_SHADER_STAGE_FRAGMENT_BIT;
-  stages[1].module = fragment.get();
-
+absl::StatusOr<Owned<VkPipeline>> pipeline(VkDevice device, const Stage& want) {
   static constexpr std::array<VkVertexInputAttributeDescription, 6> kAttributes{{
       {0, 0, VK_FORMAT_R32G32B32_SFLOAT, offsetof(Vertex, position)},
       {1, 0, VK_FORMAT_R32G32B32_SFLOAT, offsetof(Vertex, normal)},
@@ -94,68 +44,16 @@ absl::StatusOr<Owned<VkPipeline>> pipeline(VkDevice device, const PipelineInfo& 
       {4, 0, VK_FORMAT_R32G32_SFLOAT, offsetof(Vertex, emission_uv)},
       {5, 0, VK_FORMAT_R32G32_SFLOAT, offsetof(Vertex, lightmap_uv)},
   }};
-  std::vector<VkVertexInputAttributeDescription> attributes;
-  for (const uint32_t location : want.locations) attributes.push_back(kAttributes[location]);
-  const VkVertexInputBindingDescription binding{0, sizeof(Vertex), VK_VERTEX_INPUT_RATE_VERTEX};
-  auto input =
-      vulkan_struct<VkPipelineVertexInputStateCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_VERTEX_INPUT_STATE_CREATE_INFO);
-  input.vertexBindingDescriptionCount = 1;
-  input.pVertexBindingDescriptions = &binding;
-  input.vertexAttributeDescriptionCount = static_cast<uint32_t>(attributes.size());
-  input.pVertexAttributeDescriptions = attributes.data();
-
-  auto assembly = vulkan_struct<VkPipelineInputAssemblyStateCreateInfo>(
-      VK_STRUCTURE_TYPE_PIPELINE_INPUT_ASSEMBLY_STATE_CREATE_INFO);
-  assembly.topology = VK_PRIMITIVE_TOPOLOGY_TRIANGLE_LIST;
-  auto viewport =
-      vulkan_struct<VkPipelineViewportStateCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_VIEWPORT_STATE_CREATE_INFO);
-  viewport.viewportCount = 1;
-  viewport.scissorCount = 1;
-  auto raster =
-      vulkan_struct<VkPipelineRasterizationStateCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_RASTERIZATION_STATE_CREATE_INFO);
-  raster.cullMode = VK_CULL_MODE_NONE;
-  raster.lineWidth = 1;
-  auto samples =
-      vulkan_struct<VkPipelineMultisampleStateCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_MULTISAMPLE_STATE_CREATE_INFO);
-  samples.rasterizationSamples = VK_SAMPLE_COUNT_1_BIT;
-  auto depth =
-      vulkan_struct<VkPipelineDepthStencilStateCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_DEPTH_STENCIL_STATE_CREATE_INFO);
-  depth.depthTestEnable = VK_TRUE;
-  depth.depthWriteEnable = VK_TRUE;
-  depth.depthCompareOp = want.depth_test;
-  VkPipelineColorBlendAttachmentState write{};
-  write.colorWriteMask =
-      VK_COLOR_COMPONENT_R_BIT | VK_COLOR_COMPONENT_G_BIT | VK_COLOR_COMPONENT_B_BIT | VK_COLOR_COMPONENT_A_BIT;
-  auto blend =
-      vulkan_struct<VkPipelineColorBlendStateCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_COLOR_BLEND_STATE_CREATE_INFO);
-  blend.attachmentCount = want.colour ? 1u : 0u;
-  blend.pAttachments = &write;
-  const std::array<VkDynamicState, 2> dynamic_states{VK_DYNAMIC_STATE_VIEWPORT, VK_DYNAMIC_STATE_SCISSOR};
-  auto dynamic = vulkan_struct<VkPipelineDynamicStateCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_DYNAMIC_STATE_CREATE_INFO);
-  dynamic.dynamicStateCount = static_cast<uint32_t>(dynamic_states.size());
-  dynamic.pDynamicStates = dynamic_states.data();
-  auto rendering = vulkan_struct<VkPipelineRenderingCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_RENDERING_CREATE_INFO);
-  rendering.colorAttachmentCount = want.colour ? 1u : 0u;
-  rendering.pColorAttachmentFormats = &kColourFormat;
-  rendering.depthAttachmentFormat = kDepthFormat;
-
-  auto info = vulkan_struct<VkGraphicsPipelineCreateInfo>(VK_STRUCTURE_TYPE_GRAPHICS_PIPELINE_CREATE_INFO);
-  info.pNext = &rendering;
-  info.stageCount = want.fragment.empty() ? 1u : 2u;
-  info.pStages = stages.data();
-  info.pVertexInputState = &input;
-  info.pInputAssemblyState = &assembly;
-  info.pViewportState = &viewport;
-  info.pRasterizationState = &raster;
-  info.pMultisampleState = &samples;
-  info.pDepthStencilState = &depth;
-  info.pColorBlendState = &blend;
-  info.pDynamicState = &dynamic;
+  GraphicsPipeline info;
   info.layout = want.layout;
-  VkPipeline handle = VK_NULL_HANDLE;
-  LL_VK_RETURN_IF_ERROR("vkCreateGraphicsPipelines",
-                        vkCreateGraphicsPipelines(device, VK_NULL_HANDLE, 1, &info, nullptr, &handle));
-  return Owned<VkPipeline>(device, handle, vkDestroyPipeline);
+  info.vertex = want.vertex;
+  info.fragment = want.fragment;
+  info.stride = sizeof(Vertex);
+  for (const uint32_t location : want.locations) info.attributes.push_back(kAttributes[location]);
+  info.colour = want.colour ? kColourFormat : VK_FORMAT_UNDEFINED;
+  info.depth = kDepthFormat;
+  info.depth_test = want.depth_test;
+  return graphics_pipeline(device, info);
 }
 
 }  // namespace

@@ -34,6 +34,7 @@ absl::StatusOr<std::unique_ptr<Renderer>> Renderer::create(Gpu* gpu, const Scene
                                                            uint32_t shadow_size) {
   std::unique_ptr<Renderer> r(new Renderer(gpu, scene));
   LL_ASSIGN_OR_RETURN(r->pipelines_, make_pipelines(*gpu));
+  r->layout_ = layout;
   r->mesh_ = make_mesh(scene, layout);
   LL_ASSIGN_OR_RETURN(r->vertices_, gpu->device_buffer(bytes_of(r->mesh_.vertices), VK_BUFFER_USAGE_VERTEX_BUFFER_BIT));
   r->mesh_.vertices = {};
@@ -139,16 +140,22 @@ absl::Status Renderer::update_lights() {
 }
 
 void Renderer::record_shadows(VkCommandBuffer commands) const {
-  shadow_maps_->record(commands, views_.views, pipelines_, vertices_.handle.get(), mesh_, scene_, *materials_);
+  const bool keep = drawn_.has_value();
+  std::vector<gpu::ViewData> changed;
+  for (size_t v = 0; v < views_.views.size(); ++v) {
+    if (!keep || (*drawn_)[v].view_projection != views_.views[v].view_projection) changed.push_back(views_.views[v]);
+  }
+  shadow_maps_->record(commands, changed, keep, pipelines_, vertices_.handle.get(), mesh_, scene_, *materials_);
+  drawn_ = views_.views;
 }
 
-absl::Status Renderer::make_target(uint32_t width, uint32_t height) {
+absl::Status Renderer::set_size(uint32_t width, uint32_t height) {
   if (colour_.width == width && colour_.height == height) return absl::OkStatus();
   TextureInfo info;
   info.width = width;
   info.height = height;
   info.format = kColourFormat;
-  info.usage = VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT | VK_IMAGE_USAGE_TRANSFER_SRC_BIT;
+  info.usage = VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT | VK_IMAGE_USAGE_TRANSFER_SRC_BIT | VK_IMAGE_USAGE_SAMPLED_BIT;
   LL_ASSIGN_OR_RETURN(colour_, gpu_->texture(info));
   info.format = kDepthFormat;
   info.aspect = VK_IMAGE_ASPECT_DEPTH_BIT;
@@ -158,7 +165,7 @@ absl::Status Renderer::make_target(uint32_t width, uint32_t height) {
   return absl::OkStatus();
 }
 
-void Renderer::record_forward(VkCommandBuffer commands, Vec3 background) const {
+void Renderer::record_forward(VkCommandBuffer commands) const {
   transition(commands, colour_.handle.get(), VK_IMAGE_ASPECT_COLOR_BIT, kNoUse, kColour);
   transition(commands, depth_.handle.get(), VK_IMAGE_ASPECT_DEPTH_BIT, kNoUse, kDepth);
   auto colour = vulkan_struct<VkRenderingAttachmentInfo>(VK_STRUCTURE_TYPE_RENDERING_ATTACHMENT_INFO);
@@ -166,11 +173,10 @@ void Renderer::record_forward(VkCommandBuffer commands, Vec3 background) const {
   colour.imageLayout = kColour.layout;
   colour.loadOp = VK_ATTACHMENT_LOAD_OP_CLEAR;
   colour.storeOp = VK_ATTACHMENT_STORE_OP_STORE;
-  colour.clearValue.color = {{background.x, background.y, background.z, 1}};
+  colour.clearValue.color = {{background_.x, background_.y, background_.z, 1}};
   auto depth = colour;
   depth.imageView = depth_.view.get();
   depth.imageLayout = kDepth.layout;
-  depth.storeOp = VK_ATTACHMENT_STORE_OP_DONT_CARE;
   depth.clearValue.depthStencil = {0, 0};
   auto rendering = vulkan_struct<VkRenderingInfo>(VK_STRUCTURE_TYPE_RENDERING_INFO);
   rendering.renderArea = {{0, 0}, {colour_.width, colour_.height}};
@@ -197,8 +203,11 @@ void Renderer::record_forward(VkCommandBuffer commands, Vec3 background) const {
     vkCmdDraw(commands, range.count, 1, range.first, 0);
   }
   vkCmdEndRendering(commands);
+  transition(commands, colour_.handle.get(), VK_IMAGE_ASPECT_COLOR_BIT, kColour, kSampled);
+}
 
-  transition(commands, colour_.handle.get(), VK_IMAGE_ASPECT_COLOR_BIT, kColour, kCopySource);
+void Renderer::record_read(VkCommandBuffer commands) const {
+  transition(commands, colour_.handle.get(), VK_IMAGE_ASPECT_COLOR_BIT, kSampled, kCopySource);
   VkBufferImageCopy region{};
   region.imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1};
   region.imageExtent = {colour_.width, colour_.height, 1};
@@ -224,26 +233,76 @@ Image Renderer::resolve(int width, int height, int side) const {
   return image;
 }
 
-absl::StatusOr<Image> Renderer::render(const Camera& camera, const PictureOptions& options,
-                                       const std::function<absl::Status(VkCommandBuffer)>& between) {
-  LL_ASSIGN_OR_RETURN(const int height, image_height(camera, options.width));
-  const int side = static_cast<int>(strata(options.samples));
-  LL_RETURN_IF_ERROR(make_target(static_cast<uint32_t>(options.width * side), static_cast<uint32_t>(height * side)));
+absl::Status Renderer::set_view(const Camera& camera, Layer layer) {
   LL_RETURN_IF_ERROR(update_lights());
   const gpu::FrameData frame{camera_matrix(camera),
                              {camera.position.x, camera.position.y, camera.position.z, 0},
                              static_cast<uint32_t>(views_.lights.size()),
-                             static_cast<uint32_t>(options.layer),
+                             static_cast<uint32_t>(layer),
                              shadow_maps_->size(),
                              0};
   std::memcpy(frame_data_.mapped, &frame, sizeof frame);
+  background_ = shows_sky(layer) ? scene_.environment : Vec3{};
+  return absl::OkStatus();
+}
+
+absl::Status Renderer::record(VkCommandBuffer commands,
+                              const std::function<absl::Status(VkCommandBuffer)>& between) const {
+  record_shadows(commands);
+  absl::Status status = between ? between(commands) : absl::OkStatus();
+  if (!status.ok()) {
+    drawn_.reset();  // nothing of this will run
+    return status;
+  }
+  record_forward(commands);
+  return absl::OkStatus();
+}
+
+absl::StatusOr<Image> Renderer::read() const {
+  LL_RETURN_IF_ERROR(gpu_->run([&](VkCommandBuffer commands) {
+    record_read(commands);
+    transition(commands, colour_.handle.get(), VK_IMAGE_ASPECT_COLOR_BIT, kCopySource, kSampled);
+    return absl::OkStatus();
+  }));
+  return resolve(static_cast<int>(colour_.width), static_cast<int>(colour_.height), 1);
+}
+
+absl::StatusOr<Image> Renderer::render(const Camera& camera, const PictureOptions& options,
+                                       const std::function<absl::Status(VkCommandBuffer)>& between) {
+  LL_ASSIGN_OR_RETURN(const int height, image_height(camera, options.width));
+  const int side = static_cast<int>(strata(options.samples));
+  LL_RETURN_IF_ERROR(set_size(static_cast<uint32_t>(options.width * side), static_cast<uint32_t>(height * side)));
+  LL_RETURN_IF_ERROR(set_view(camera, options.layer));
   LL_RETURN_IF_ERROR(gpu_->run([&](VkCommandBuffer commands) -> absl::Status {
-    record_shadows(commands);
-    if (between) LL_RETURN_IF_ERROR(between(commands));
-    record_forward(commands, shows_sky(options.layer) ? scene_.environment : Vec3{});
+    LL_RETURN_IF_ERROR(record(commands, between));
+    record_read(commands);
     return absl::OkStatus();
   }));
   return resolve(options.width, height, side);
+}
+
+absl::Status Renderer::update_object(size_t object) {
+  const std::vector<VertexRun> runs = object_vertices(scene_, layout_, mesh_, object);
+  uint64_t bytes = 0;
+  for (const VertexRun& run : runs) bytes += run.vertices.size() * sizeof(Vertex);
+  if (bytes == 0) return absl::OkStatus();
+  LL_ASSIGN_OR_RETURN(const Buffer staging, gpu_->host_buffer(bytes, VK_BUFFER_USAGE_TRANSFER_SRC_BIT));
+  std::vector<VkBufferCopy> regions;
+  uint64_t at = 0;
+  for (const VertexRun& run : runs) {
+    const uint64_t size = run.vertices.size() * sizeof(Vertex);
+    std::memcpy(static_cast<uint8_t*>(staging.mapped) + at, run.vertices.data(), size);
+    regions.push_back({at, run.first * sizeof(Vertex), size});
+    at += size;
+  }
+  bounds_ = scene_.bounds();
+  drawn_.reset();
+  return gpu_->run([&](VkCommandBuffer commands) {
+    vkCmdCopyBuffer(commands, staging.handle.get(), vertices_.handle.get(), static_cast<uint32_t>(regions.size()),
+                    regions.data());
+    after_copies(commands);
+    return absl::OkStatus();
+  });
 }
 
 }  // namespace lightloom::renderer

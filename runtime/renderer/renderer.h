@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "core/receivers/layout.h"
@@ -42,6 +43,7 @@ class Renderer {
   /// After update_lights().
   const ShadowViews& shadow_views() const { return views_; }
   const ShadowMaps& shadow_maps() const { return *shadow_maps_; }
+  /// Only those whose light has moved since. What is recorded must run.
   void record_shadows(VkCommandBuffer commands) const;
 
   /// A whole frame: update_lights, shadow maps, what `between` records (lightloom, for instance), the forward pass.
@@ -49,22 +51,37 @@ class Renderer {
   absl::StatusOr<Image> render(const Camera& camera, const PictureOptions& options,
                                const std::function<absl::Status(VkCommandBuffer)>& between = nullptr);
 
+  /// The same in steps, for pictures that stay on the device. Nothing recorded may be running in the first two.
+  absl::Status set_size(uint32_t width, uint32_t height);
+  absl::Status set_view(const Camera& camera, Layer layer);
+  /// Leaves colour() as kSampled and depth() as kDepth.
+  absl::Status record(VkCommandBuffer commands, const std::function<absl::Status(VkCommandBuffer)>& between) const;
+  const Texture2D& colour() const { return colour_; }  ///< kColourFormat, linear radiance
+  const Texture2D& depth() const { return depth_; }    ///< kDepthFormat, 1 near
+  /// colour() as it was drawn last. Waits.
+  absl::StatusOr<Image> read() const;
+
+  /// Takes over where an object's vertices are now; its triangles are as many as they were.
+  absl::Status update_object(size_t object);
+
  private:
   Renderer(Gpu* gpu, const Scene& scene) : gpu_(gpu), scene_(scene) {}
   absl::Status make_frame_set();
   void bind_image(uint32_t binding, VkSampler sampler, VkImageView view, VkImageLayout layout) const;
-  absl::Status make_target(uint32_t width, uint32_t height);
-  void record_forward(VkCommandBuffer commands, Vec3 background) const;
+  void record_forward(VkCommandBuffer commands) const;
+  void record_read(VkCommandBuffer commands) const;
   Image resolve(int width, int height, int side) const;
 
   Gpu* gpu_;
   const Scene& scene_;
+  AtlasLayout layout_;
   Pipelines pipelines_;
   Mesh mesh_;  ///< its vertices are on the device only
   Buffer vertices_;
   std::unique_ptr<Materials> materials_;
   std::unique_ptr<ShadowMaps> shadow_maps_;
   ShadowViews views_;
+  mutable std::optional<std::vector<gpu::ViewData>> drawn_;  ///< what the shadow maps hold; none: nothing of use
   std::vector<LightType> light_types_;
   Aabb bounds_;
   Buffer frame_data_, light_data_, view_data_;
@@ -73,6 +90,7 @@ class Renderer {
   Owned<VkDescriptorPool> pool_;
   VkDescriptorSet frame_set_ = VK_NULL_HANDLE;
   Texture2D colour_, depth_;
+  Vec3 background_;
   Buffer readback_;
 };
 

@@ -42,11 +42,13 @@ absl::StatusOr<ShadowMaps> ShadowMaps::create(const Gpu& gpu, uint32_t views, ui
   return maps;
 }
 
-void ShadowMaps::record(VkCommandBuffer commands, const std::vector<gpu::ViewData>& views, const Pipelines& pipelines,
-                        VkBuffer vertices, const Mesh& mesh, const Scene& scene, const Materials& materials) const {
-  // What sampled the maps before must be done; their contents are drawn anew.
+void ShadowMaps::record(VkCommandBuffer commands, const std::vector<gpu::ViewData>& views, bool keep,
+                        const Pipelines& pipelines, VkBuffer vertices, const Mesh& mesh, const Scene& scene,
+                        const Materials& materials) const {
+  if (keep && views.empty()) return;
+  // What sampled the maps before must be done.
   Use before = kSampled;
-  before.layout = VK_IMAGE_LAYOUT_UNDEFINED;
+  if (!keep) before.layout = VK_IMAGE_LAYOUT_UNDEFINED;
   transition(commands, image_.handle.get(), VK_IMAGE_ASPECT_DEPTH_BIT, before, kDepth);
   const VkRect2D area{{0, 0}, {image_.width, image_.height}};
   const VkViewport viewport{0, 0, static_cast<float>(image_.width), static_cast<float>(image_.height), 0, 1};

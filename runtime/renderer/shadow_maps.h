@@ -21,9 +21,9 @@ class ShadowMaps {
   /// A 2D array, one layer per view.
   VkImageView view() const { return image_.view.get(); }
 
-  /// Draws every view and leaves the array to be sampled (kSampled). Both sides of every triangle block; the holes
-  /// of masked materials do not.
-  void record(VkCommandBuffer commands, const std::vector<gpu::ViewData>& views, const Pipelines& pipelines,
+  /// Draws these views and leaves the array to be sampled (kSampled). Both sides of every triangle block; the holes
+  /// of masked materials do not. `keep`: layers of other views hold what was drawn before.
+  void record(VkCommandBuffer commands, const std::vector<gpu::ViewData>& views, bool keep, const Pipelines& pipelines,
               VkBuffer vertices, const Mesh& mesh, const Scene& scene, const Materials& materials) const;
 
  private:

@@ -24,6 +24,8 @@ function add(file, name, quoted,    thing, ours) {
   for (thing in things) {
     if (name !~ header_of[thing]) continue
     uses[file, thing] = where
+    if (thing in included_in && !inside_any(file, included_in[thing]))
+      broken(where ": <" name ">: " thing " is included in " included_in[thing] "/ alone")
     if (file ~ /[.](h|hpp|inl)$/ && thing in in_headers && !inside_any(file, in_headers[thing]))
       broken(where ": <" name ">: " thing " stays in .cpp files (in headers: " in_headers[thing] ")")
   }

@@ -38,6 +38,7 @@ FNR == NR {
   else if ($1 == "never" && NF >= 3) never[$2] = rest(3)
   else if ($1 == "only" && NF >= 3) only[$2] = rest(3)
   else if ($1 == "in-headers" && NF >= 3) in_headers[$2] = rest(3)
+  else if ($1 == "included-in" && NF >= 3) included_in[$2] = rest(3)
   else if ($1 == "once" && NF >= 3) once[$2] = rest(3)
   else stop("rules.txt:" FNR ": cannot read '" $0 "'")
   next

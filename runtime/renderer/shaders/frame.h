@@ -68,9 +68,20 @@ struct ShadowPush {
   float cutoff;
 };
 
+/// Exposure 0: the values are shown as they are.
+struct ToneMapPush {
+  float exposure;
+};
+
+/// What lies on a surface is drawn before it: its depth (1 near) is taken times `nearer`.
+struct LinesPush {
+  mat4 view_projection;
+  float nearer;
+};
+
 #ifdef __cplusplus
 static_assert(sizeof(FrameData) == 96 && sizeof(LightData) == 64 && sizeof(ViewData) == 80);
-static_assert(sizeof(MaterialPush) == 36 && sizeof(ShadowPush) == 72);
+static_assert(sizeof(MaterialPush) == 36 && sizeof(ShadowPush) == 72 && sizeof(LinesPush) == 68);
 }  // namespace lightloom::renderer::gpu
 #undef LL_CONSTANT
 #endif
