@@ -2,8 +2,13 @@
 
 #include <algorithm>
 
+#include "core/base/file.h"
+
 namespace lightloom {
 namespace {
+
+/// Of the way from one detail of a cell to another, each frame.
+constexpr float kFade = 0.3f;
 
 void store(Vec3 v, float* to) {
   to[0] = v.x;
@@ -14,11 +19,13 @@ void store(Vec3 v, float* to) {
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<LiveRuntime>> LiveRuntime::create(const renderer::Gpu& gpu, const Scene& scene,
-                                                                 const std::filesystem::path& loom) {
-  std::unique_ptr<LiveRuntime> live(new LiveRuntime(scene));
+                                                                 const std::filesystem::path& loom,
+                                                                 const Options& options) {
+  std::unique_ptr<LiveRuntime> live(new LiveRuntime(scene, options));
   const RuntimeMessages& messages = live->messages_;
   lightloom_vulkan_create_info create{};
   create.struct_size = sizeof create;
+  create.flags = options.streams ? LIGHTLOOM_CREATE_SMOOTHING : 0;
   create.message = RuntimeMessages::receive;
   create.message_user = &live->messages_;
   create.instance = gpu.instance();
@@ -33,14 +40,78 @@ absl::StatusOr<std::unique_ptr<LiveRuntime>> LiveRuntime::create(const renderer:
   lightloom_runtime* runtime = nullptr;
   LL_RETURN_IF_ERROR(messages.status(lightloom_vulkan_create(&create, &runtime)));
   live->runtime_.reset(runtime);
-  LL_RETURN_IF_ERROR(load_loom(loom, messages, runtime));
+  if (options.streams) {
+    LL_RETURN_IF_ERROR(live->set_fade());
+    LL_ASSIGN_OR_RETURN(const auto manifest, read_file(loom / "manifest"));
+    LL_RETURN_IF_ERROR(messages.status(lightloom_load_manifest(runtime, manifest.data(), manifest.size())));
+    LL_RETURN_IF_ERROR(live->start_stream(loom));
+  } else {
+    LL_RETURN_IF_ERROR(load_loom(loom, messages, runtime));
+  }
   live->outputs_.struct_size = sizeof live->outputs_;
   LL_RETURN_IF_ERROR(messages.status(lightloom_vulkan_get_outputs(runtime, &live->outputs_)));
   return live;
 }
 
+absl::Status LiveRuntime::set_fade() {
+  lightloom_update_options options{};
+  options.struct_size = sizeof options;
+  options.fade = kFade;
+  return messages_.status(lightloom_set_update_options(runtime_.get(), &options));
+}
+
+absl::Status LiveRuntime::start_stream(const std::filesystem::path& loom) {
+  reader_ = std::make_unique<LoomReader>(loom);
+  lightloom_stream_info info{};
+  info.struct_size = sizeof info;
+  info.read_chunk = LoomReader::read;
+  info.read_user = reader_.get();
+  info.byte_budget = options_.byte_budget;
+  lightloom_stream* stream = nullptr;
+  LL_RETURN_IF_ERROR(messages_.status(lightloom_stream_create(runtime_.get(), &info, &stream)));
+  stream_.reset(stream);
+  lightloom_counts counts{};
+  counts.struct_size = sizeof counts;
+  LL_RETURN_IF_ERROR(messages_.status(lightloom_get_counts(runtime_.get(), &counts)));
+  cells_ = counts.cells;
+  return absl::OkStatus();
+}
+
+absl::Status LiveRuntime::reload(const Scene& scene, const std::filesystem::path& loom) {
+  LL_ASSIGN_OR_RETURN(const auto manifest, read_file(loom / "manifest"));
+  stream_.reset();
+  LL_RETURN_IF_ERROR(messages_.status(lightloom_reload_manifest(runtime_.get(), manifest.data(), manifest.size())));
+  scene_ = &scene;
+  LL_RETURN_IF_ERROR(start_stream(loom));
+  return messages_.status(lightloom_vulkan_get_outputs(runtime_.get(), &outputs_));
+}
+
+absl::Status LiveRuntime::look_from(Vec3 position, Vec3 velocity) {
+  lightloom_stream_view view{};
+  view.struct_size = sizeof view;
+  store(position, view.position);
+  store(velocity, view.velocity);
+  return messages_.status(lightloom_stream_set_view(stream_.get(), &view));
+}
+
+bool LiveRuntime::arriving() const {
+  if (stream_ == nullptr) return false;
+  lightloom_stream_state state{};
+  state.struct_size = sizeof state;
+  lightloom_counts counts{};
+  counts.struct_size = sizeof counts;
+  return lightloom_stream_get_state(stream_.get(), &state) == LIGHTLOOM_OK &&
+         lightloom_get_counts(runtime_.get(), &counts) == LIGHTLOOM_OK && (state.done == 0 || counts.pending_bytes > 0);
+}
+
+std::vector<uint8_t> LiveRuntime::cell_levels() const {
+  std::vector<uint8_t> levels(cells_, 3);
+  if (stream_ != nullptr) lightloom_stream_get_levels(stream_.get(), levels.data(), static_cast<uint32_t>(cells_));
+  return levels;
+}
+
 absl::Status LiveRuntime::set_materials(const SurfaceInputs& inputs) {
-  return set_albedo_emission_sky(inputs, scene_.environment, messages_, runtime_.get());
+  return set_albedo_emission_sky(inputs, scene_->environment, messages_, runtime_.get());
 }
 
 absl::Status LiveRuntime::set_materials(const SurfaceInputs& inputs, uint64_t first) {
@@ -65,8 +136,8 @@ absl::Status LiveRuntime::upload(renderer::Gpu* gpu, const std::function<absl::S
 absl::Status LiveRuntime::record(const renderer::Renderer& renderer, VkCommandBuffer commands) {
   const renderer::ShadowViews& shadows = renderer.shadow_views();
   std::vector<lightloom_light> lights;
-  for (size_t i = 0; i < scene_.lights.size(); ++i) {
-    const Light& from = scene_.lights[i];
+  for (size_t i = 0; i < scene_->lights.size(); ++i) {
+    const Light& from = scene_->lights[i];
     lightloom_light& to = lights.emplace_back();
     to.type = static_cast<uint32_t>(from.type);
     to.first_shadow_view = shadows.lights[i].first_view;

@@ -79,7 +79,7 @@ absl::Status LiveStage::start() {
   LL_ASSIGN_OR_RETURN(gpu_, renderer::Gpu::create(options_.validation));
   LL_ASSIGN_OR_RETURN(renderer_, renderer::Renderer::create(gpu_.get(), scene, elements_.layout,
                                                             static_cast<uint32_t>(options_.shadow_size)));
-  LL_ASSIGN_OR_RETURN(runtime_, LiveRuntime::create(*gpu_, scene, options_.loom));
+  LL_ASSIGN_OR_RETURN(runtime_, LiveRuntime::create(*gpu_, scene, options_.loom, {}));
   LL_ASSIGN_OR_RETURN(const SurfaceInputs inputs, surface_materials(*level_.tracer, elements_, options_.direct_samples,
                                                                     bar_->parallel("materials", options_.threads)));
   bar_->finish();

@@ -2,53 +2,45 @@
 
 #include <algorithm>
 
-#include "core/asset/asset.h"
 #include "core/base/file.h"
 
 namespace lightloom {
-namespace {
-
-struct Reader {
-  ChunkStore store;
-  absl::Status status;  ///< of the newest chunk
-};
-
-int read_chunk(void* user, const uint8_t digest[32], uint64_t size, void* out) {
-  auto* reader = static_cast<Reader*>(user);
+int LoomReader::read(void* user, const uint8_t digest[32], uint64_t size, void* out) {
+  auto* reader = static_cast<LoomReader*>(user);
   ChunkRef ref;
   std::copy(digest, digest + 32, ref.digest.bytes.begin());
   ref.size = size;
-  const auto bytes = reader->store.get(ref);
-  reader->status = bytes.status();
+  const auto bytes = reader->store_.get(ref);
+  reader->status_ = bytes.status();
   if (!bytes.ok()) return 1;
   std::copy(bytes->begin(), bytes->end(), static_cast<uint8_t*>(out));
   return 0;
 }
 
-}  // namespace
-
 void RuntimeMessages::receive(void* user, lightloom_message_kind kind, const char* text) {
   auto* self = static_cast<RuntimeMessages*>(user);
+  const std::lock_guard lock(self->mutex_);
   if (kind == LIGHTLOOM_MESSAGE_VALIDATION) ++self->validation_;
   self->newest_ = text;
 }
 
 absl::Status RuntimeMessages::status(lightloom_result result) const {
+  const std::lock_guard lock(mutex_);
   if (result == LIGHTLOOM_OK && validation_ == 0) return absl::OkStatus();
   return absl::UnavailableError("runtime: " + (newest_.empty() ? lightloom_result_string(result) : newest_));
 }
 
 absl::Status load_loom(const std::filesystem::path& loom, const RuntimeMessages& messages, lightloom_runtime* runtime) {
   LL_ASSIGN_OR_RETURN(const auto manifest, read_file(loom / "manifest"));
-  Reader reader{chunk_store(loom), absl::OkStatus()};
+  LoomReader reader(loom);
   lightloom_asset_info asset{};
   asset.struct_size = sizeof asset;
   asset.manifest = manifest.data();
   asset.manifest_bytes = manifest.size();
-  asset.read_chunk = read_chunk;
+  asset.read_chunk = LoomReader::read;
   asset.read_user = &reader;
   const absl::Status loaded = messages.status(lightloom_load(runtime, &asset));
-  return reader.status.ok() ? loaded : reader.status;
+  return reader.status().ok() ? loaded : reader.status();
 }
 
 absl::Status set_albedo_emission_sky(const SurfaceInputs& inputs, Vec3 environment, const RuntimeMessages& messages,

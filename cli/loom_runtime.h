@@ -4,13 +4,15 @@
 #include <lightloom.h>
 
 #include <filesystem>
+#include <mutex>
 #include <string>
 
 #include "cli/player.h"
+#include "core/asset/asset.h"
 
 namespace lightloom {
 
-/// What a runtime says: give `receive` and this to it. Must outlive it.
+/// What a runtime says: give `receive` and this to it. Must outlive it. Any thread.
 class RuntimeMessages {
  public:
   static void receive(void* user, lightloom_message_kind kind, const char* text);
@@ -18,8 +20,21 @@ class RuntimeMessages {
   absl::Status status(lightloom_result result) const;
 
  private:
+  mutable std::mutex mutex_;
   std::string newest_;
   int validation_ = 0;
+};
+
+/// Chunks of an asset on disk: `read` with this as its user is a lightloom_read_chunk_fn, for one thread at a time.
+class LoomReader {
+ public:
+  explicit LoomReader(const std::filesystem::path& loom) : store_(chunk_store(loom)) {}
+  static int read(void* user, const uint8_t digest[32], uint64_t size, void* out);
+  const absl::Status& status() const { return status_; }  ///< of the newest chunk
+
+ private:
+  ChunkStore store_;
+  absl::Status status_;
 };
 
 /// The manifest and every chunk.

@@ -45,6 +45,7 @@ absl::Status check(Options* o) {
   if (v.width < 64 || v.width > 16384) return bad("--width must be 64 to 16384");
   if (v.height < 64 || v.height > 16384) return bad("--height must be 64 to 16384");
   if (!(v.exposure >= 0)) return bad("--exposure must be ≥ 0");
+  if (!(v.budget >= 0) || v.budget > 1e9) return bad("--budget must be 0 to 1e9 MB");
   if (v.shadow_size != 0 && (v.shadow_size < 16 || v.shadow_size > 16384)) {
     return bad("--shadow-size must be 16 to 16384, or 0");
   }
@@ -85,6 +86,7 @@ Command view_command() {
            {"--width", "pixels across", &v.width},
            {"--height", "pixels down", &v.height},
            {"--exposure", "factor before the tone map; 0: from the first pictures", &v.exposure},
+           {"--budget", "MB of cells and relight sets in memory, streamed; 0: no limit", &v.budget},
            {"--shadow-size", "texels along a side of a shadow map; 0: by the number of lights", &v.shadow_size},
            {"--save-as", ".glb for the edited level; empty: SCENE-edited.glb", &v.save_as},
            {"--script", "file of commands, one a line (docs/view.md)", &o->script},

@@ -69,6 +69,13 @@ absl::Status Viewer::act(const Action& action) {
     case Verb::kWaitBake:
       wait_bake_ = true;
       return absl::OkStatus();
+    case Verb::kWaitReload:
+      wait_reload_ = true;
+      return absl::OkStatus();
+    case Verb::kWaitArrival:
+      wait_arrival_ = true;
+      wait_frames_ = 2;  // so that the stream has seen where the camera is
+      return absl::OkStatus();
     case Verb::kQuit:
       done_ = true;
       return absl::OkStatus();

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "cli/interrupt.h"
 #include "cli/progress.h"
 #include "cli/scene_edit.h"
 #include "core/base/text.h"
@@ -13,11 +12,9 @@ namespace {
 constexpr int kMaterialSamples =
     16;  // points of a texel that its colour is the mean of, as StageOptions::direct_samples
 
-/// Where they are of the same kinds.
-void keep_lights(const std::vector<Light>& from, Scene* scene) {
-  const bool same = std::equal(from.begin(), from.end(), scene->lights.begin(), scene->lights.end(),
-                               [](const Light& a, const Light& b) { return a.type == b.type && a.name == b.name; });
-  if (same) scene->lights = from;
+bool same_kinds(const std::vector<Light>& a, const std::vector<Light>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](const Light& x, const Light& y) { return x.type == y.type && x.name == y.name; });
 }
 
 std::string name_of_copy(const Scene& scene, const std::string& name) {
@@ -32,33 +29,47 @@ std::string name_of_copy(const Scene& scene, const std::string& name) {
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<LiveLevel>> LiveLevel::load(renderer::Gpu* gpu, const LevelFiles& files,
-                                                           uint32_t shadow_size, const Paints& paints,
-                                                           const std::vector<Light>& lights) {
-  std::unique_ptr<LiveLevel> level(new LiveLevel(gpu, files, shadow_size));
-  LL_ASSIGN_OR_RETURN(level->manifest_, read_manifest(files.loom));
-  LL_ASSIGN_OR_RETURN(level->level_, load_level(files.scene, files.lights, files.rig, [&](Scene* scene) {
-                        keep_lights(lights, scene);
-                        return absl::OkStatus();
-                      }));
-  LL_RETURN_IF_ERROR(level->start());
+                                                           uint32_t shadow_size, uint64_t byte_budget) {
+  std::unique_ptr<LiveLevel> level(new LiveLevel(gpu, files, shadow_size, byte_budget));
+  LL_RETURN_IF_ERROR(level->start(nullptr));
+  return level;
+}
+
+absl::StatusOr<std::unique_ptr<LiveLevel>> LiveLevel::load_again(LiveLevel* before, const std::string& scene) {
+  LevelFiles files = before->files_;
+  files.scene = scene;
+  std::unique_ptr<LiveLevel> level(new LiveLevel(before->gpu_, files, before->shadow_size_, before->byte_budget_));
+  LL_RETURN_IF_ERROR(level->start(before));
   for (size_t o = 0; o < level->scene().objects.size(); ++o) {
-    const auto paint = paints.find(level->scene().objects[o].name);
-    if (paint == paints.end()) continue;
+    const auto paint = before->paints_.find(level->scene().objects[o].name);
+    if (paint == before->paints_.end()) continue;
     if (paint->second.albedo) LL_RETURN_IF_ERROR(level->set_albedo(o, *paint->second.albedo));
     if (paint->second.emission) LL_RETURN_IF_ERROR(level->set_emission(o, *paint->second.emission));
   }
   return level;
 }
 
-absl::Status LiveLevel::start() {
+absl::Status LiveLevel::start(LiveLevel* before) {
+  LL_ASSIGN_OR_RETURN(manifest_, read_manifest(files_.loom));
+  bool keep = before != nullptr;
+  LL_ASSIGN_OR_RETURN(level_, load_level(files_.scene, files_.lights, files_.rig, [&](Scene* scene) {
+                        keep = keep && same_kinds(before->scene().lights, scene->lights);
+                        if (keep) scene->lights = before->scene().lights;
+                        return absl::OkStatus();
+                      }));
   ProgressBar bar;
   LL_ASSIGN_OR_RETURN(elements_, load_surface_elements(files_.loom, manifest_, scene()));
   LL_ASSIGN_OR_RETURN(const SurfaceInputs inputs,
                       surface_materials(*level_.tracer, elements_, kMaterialSamples, bar.parallel("materials", 0)));
   bar.finish();
-  LL_ASSIGN_OR_RETURN(runtime_, LiveRuntime::create(*gpu_, scene(), files_.loom));
+  if (keep) {
+    // From here on `before` has no runtime; with other lights it keeps its own, which has room for those.
+    runtime_ = std::move(before->runtime_);
+    LL_RETURN_IF_ERROR(runtime_->reload(scene(), files_.loom));
+  } else {
+    LL_ASSIGN_OR_RETURN(runtime_, LiveRuntime::create(*gpu_, scene(), files_.loom, {true, byte_budget_}));
+  }
   LL_RETURN_IF_ERROR(runtime_->set_materials(inputs));
-  LL_RETURN_IF_ERROR(runtime_->upload(gpu_, not_interrupted));
   return make_renderer();
 }
 

@@ -27,10 +27,12 @@ using Paints = std::map<std::string, Paint>;
 
 class LiveLevel {
  public:
-  /// Reads everything. Keeps `gpu`. `lights`: what to take instead of the lights there, if they are of the same types.
+  /// Reads the level; the asset streams in, of which cells and relight sets get `byte_budget` (0: no limit). Keeps `gpu`.
   static absl::StatusOr<std::unique_ptr<LiveLevel>> load(renderer::Gpu* gpu, const LevelFiles& files,
-                                                         uint32_t shadow_size, const Paints& paints = {},
-                                                         const std::vector<Light>& lights = {});
+                                                         uint32_t shadow_size, uint64_t byte_budget = 0);
+  /// The level from `scene`, baked anew, in place of `before`, whose lights (if they are of the same kinds), colours and
+  /// runtime it takes over: what has stayed goes on as it was lit. If the level cannot be read, `before` stays as it is.
+  static absl::StatusOr<std::unique_ptr<LiveLevel>> load_again(LiveLevel* before, const std::string& scene);
 
   const LevelFiles& files() const { return files_; }
   const Scene& scene() const { return *level_.scene; }
@@ -66,9 +68,9 @@ class LiveLevel {
   int renderer_generation() const { return generation_; }
 
  private:
-  LiveLevel(renderer::Gpu* gpu, LevelFiles files, uint32_t shadow_size)
-      : gpu_(gpu), files_(std::move(files)), shadow_size_(shadow_size) {}
-  absl::Status start();
+  LiveLevel(renderer::Gpu* gpu, LevelFiles files, uint32_t shadow_size, uint64_t byte_budget)
+      : gpu_(gpu), files_(std::move(files)), shadow_size_(shadow_size), byte_budget_(byte_budget) {}
+  absl::Status start(LiveLevel* before);
   absl::Status make_renderer();
   absl::Status push_materials(size_t object);
   absl::Status change_materials(size_t object, void (*change)(Vec3, Material*), Vec3 value);
@@ -77,6 +79,7 @@ class LiveLevel {
   renderer::Gpu* gpu_;
   LevelFiles files_;
   uint32_t shadow_size_;
+  uint64_t byte_budget_;
   Level level_;
   bool tracer_is_old_ = false;
   Manifest manifest_;

@@ -1,6 +1,7 @@
 #include "cli/view/overlays.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 
@@ -69,6 +70,19 @@ void add_stale(const Manifest& manifest, const SurfaceElements& elements, const 
       marks);
 }
 
+void add_residency(const Manifest& manifest, const SurfaceElements& elements, const ElementOwners& owners,
+                   const std::vector<uint8_t>& levels, Marks* marks) {
+  const auto colour = [&](uint32_t cell, uint8_t alpha) -> Rgba {
+    constexpr std::array<uint8_t, 3> kColours[] = {{120, 120, 120}, {230, 50, 40}, {240, 200, 40}, {60, 200, 90}};
+    const auto& c = kColours[std::min<size_t>(levels[cell], 3)];
+    return {c[0], c[1], c[2], alpha};
+  };
+  for (uint32_t c = 0; c < manifest.cells.size(); ++c) marks->box(manifest.cells[c].bounds, colour(c, kLine));
+  tint(
+      elements, owners,
+      [&](size_t i) { return owners.cell[i] == ElementOwners::kNone ? Rgba{} : colour(owners.cell[i], kTint); }, marks);
+}
+
 /// The element of each (object, texel key) that a cell chunk names, and the cluster of each.
 void assign(const Manifest& manifest, uint32_t cell, const CellChunk& chunk,
             const std::map<Digest, uint32_t>& scene_object, const Receivers& receivers, ElementOwners* owners) {
@@ -130,11 +144,12 @@ Rgba distinct(uint32_t number, uint8_t alpha) {
 }
 
 Marks overlay_marks(const std::set<std::string>& shown, const Manifest& manifest, const SurfaceElements& elements,
-                    const ElementOwners& owners) {
+                    const ElementOwners& owners, const std::vector<uint8_t>& levels) {
   Marks marks;
   if (shown.count("cells") > 0) add_cells(manifest, elements, owners, &marks);
   if (shown.count("ranks") > 0) add_ranks(manifest, elements, owners, &marks);
   if (shown.count("stale") > 0) add_stale(manifest, elements, owners, &marks);
+  if (shown.count("residency") > 0) add_residency(manifest, elements, owners, levels, &marks);
   if (shown.count("probes") > 0) add_probes(manifest, &marks);
   return marks;
 }

@@ -27,12 +27,14 @@ renderer::Rgba heat(float share, uint8_t alpha);
 /// A colour of its own for each number, neighbours far apart.
 renderer::Rgba distinct(uint32_t number, uint8_t alpha);
 
-/// `shown`: of kOverlays; those of other kinds are passed over.
+/// `shown`: of kOverlays; those of other kinds are passed over. `levels`: LiveRuntime::cell_levels.
 ///   cells   boxes of the bake cells' receivers and the surfaces they light, a colour each
 ///   ranks   surfaces by the rank of their cluster, blue 0 to red the greatest rank of the bake
 ///   probes  where they stand
+///   residency   boxes of the cells and their surfaces by `levels`: grey nothing, red the base, yellow some, green all
 ///   stale   surfaces and boxes of cells that a bake with a tolerance kept (red: more), fresh ones green
 renderer::Marks overlay_marks(const std::set<std::string>& shown, const Manifest& manifest,
-                              const SurfaceElements& elements, const ElementOwners& owners);
+                              const SurfaceElements& elements, const ElementOwners& owners,
+                              const std::vector<uint8_t>& levels);
 
 }  // namespace lightloom::view

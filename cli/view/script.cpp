@@ -26,6 +26,8 @@ struct Form {
 constexpr Form kForms[] = {
     {"wait", "n", Verb::kWait, "wait FRAMES", 1, 100000},
     {"wait-bake", "", Verb::kWaitBake, "wait-bake"},
+    {"wait-reload", "", Verb::kWaitReload, "wait-reload"},
+    {"wait-arrival", "", Verb::kWaitArrival, "wait-arrival"},
     {"camera", "nnnnn", Verb::kCamera, "camera x y z yaw pitch"},
     {"camera", "t", Verb::kCameraNamed, "camera NAME"},
     {"light", "tnnn", Verb::kLight, "light NAME x y z"},

@@ -13,6 +13,8 @@ namespace lightloom::view {
 enum class Verb {
   kWait,         ///< N frames
   kWaitBake,     ///< until no bake runs
+  kWaitReload,   ///< until someone else has baked the asset anew
+  kWaitArrival,  ///< until all that the camera needs is in memory
   kCamera,       ///< x y z yaw pitch, degrees
   kCameraNamed,  ///< one of the level's
   kLight,        ///< NAME x y z
@@ -48,7 +50,7 @@ struct Action {
   Vec3 vec3() const { return {numbers[0], numbers[1], numbers[2]}; }
 };
 
-inline constexpr const char* kOverlays[] = {"cells", "ranks", "probes", "stale", "lights", "panel"};
+inline constexpr const char* kOverlays[] = {"cells", "ranks", "probes", "stale", "residency", "lights", "panel"};
 inline constexpr const char* kLayers[] = {"full", "direct", "indirect", "E", "albedo"};
 
 /// Words are apart by blanks; "a name" with blanks stands in quotes; # begins a comment. Errors say "line N: …".

@@ -14,12 +14,19 @@ namespace lightloom::view {
 namespace {
 
 /// Light of a lamp needs some bounces to be there; only then is a picture's brightness worth measuring.
-constexpr int kSettle = 16, kExposeEvery = 5;  // so the first frame and the last are among those measured
+constexpr int kSettle = 26, kExposeEvery = 5;  // so the first frame and the last are among those measured
 static_assert((kSettle - 1) % kExposeEvery == 0);
+/// Seconds between two looks whether the asset was baked anew by someone else.
+constexpr double kWatch = 0.5;
 /// Frames without news, after which the viewer sleeps until some come.
 constexpr int kQuiet = 90;
 /// Frames to draw then, for the panel to follow the mouse.
 constexpr int kAfterNews = 3;
+
+std::filesystem::file_time_type time_of_manifest(const std::string& loom) {
+  std::error_code ignored;
+  return std::filesystem::last_write_time(std::filesystem::path(loom) / "manifest", ignored);
+}
 
 double smoothed(double old, double now) { return old > 0 ? old + 0.1 * (now - old) : now; }
 
@@ -46,7 +53,9 @@ absl::Status Viewer::start() {
   const renderer::WindowSystem system = window_->system();
   LL_ASSIGN_OR_RETURN(gpu_, renderer::Gpu::create(options_.validation, messages_, &system));
   saved_ = baked_ = options_.files.scene;
-  LL_ASSIGN_OR_RETURN(level_, LiveLevel::load(gpu_.get(), options_.files, static_cast<uint32_t>(options_.shadow_size)));
+  manifest_time_ = time_of_manifest(options_.files.loom);
+  LL_ASSIGN_OR_RETURN(level_, LiveLevel::load(gpu_.get(), options_.files, static_cast<uint32_t>(options_.shadow_size),
+                                              static_cast<uint64_t>(1e6 * static_cast<double>(options_.budget))));
   LL_ASSIGN_OR_RETURN(screen_, Screen::create(window_.get(), gpu_.get()));
   if (!options_.panel) state_.overlays.clear();
   state_.exposure = options_.exposure > 0 ? options_.exposure : 1;
@@ -68,15 +77,15 @@ absl::Status Viewer::begin_at_camera() {
 }
 
 absl::Status Viewer::reload(const std::string& scene) {
-  LevelFiles files = options_.files;
-  files.scene = scene;
-  LL_ASSIGN_OR_RETURN(auto fresh, LiveLevel::load(gpu_.get(), files, static_cast<uint32_t>(options_.shadow_size),
-                                                  level_->paints(), level_->scene().lights));
+  manifest_time_ = time_of_manifest(options_.files.loom);  // before it is read: a later one is news
+  LL_ASSIGN_OR_RETURN(auto fresh, LiveLevel::load_again(level_.get(), scene));
   level_ = std::move(fresh);
   saved_ = baked_ = scene;
   state_.picked.reset();
   owners_ = {};
   marks_are_old_ = true;
+  wait_reload_ = false;
+  quiet_ = 0;
   return absl::OkStatus();
 }
 
@@ -87,6 +96,7 @@ absl::Status Viewer::run() {
     const bool news = window_->poll(idle);
     if (news && idle) quiet_ = std::min(quiet_, kQuiet - kAfterNews);
     LL_RETURN_IF_ERROR(look_after_bake());
+    watch_asset();
     LL_RETURN_IF_ERROR(step_script());
     const bool asleep = quiet_ > kQuiet && !bake_.running();  // a bake has progress to show, now and then
     if (!done_ && !asleep) LL_RETURN_IF_ERROR(frame());
@@ -106,8 +116,36 @@ absl::Status Viewer::look_after_bake() {
   return wait_bake_ && !absl::IsCancelled(result) ? result : absl::OkStatus();
 }
 
+void Viewer::watch_asset() {
+  if (bake_.running() || since_look_.seconds() < kWatch) return;
+  since_look_ = Stopwatch();
+  const std::filesystem::file_time_type now = time_of_manifest(options_.files.loom);
+  if (now == manifest_time_ || now == std::filesystem::file_time_type::min()) return;
+  const bool edited = level_->edited();
+  const absl::Status status = reload(baked_);
+  manifest_time_ = now;  // what cannot be shown is not tried again and again
+  state_.message = status.ok() ? edited ? "baked anew by someone else: loaded again, edits are lost"
+                                        : "baked anew by someone else: loaded again"
+                               : std::string(status.message());
+}
+
+absl::Status Viewer::look_from_camera() {
+  const Vec3 position = state_.camera.camera(screen_->aspect()).position;
+  const float seconds = static_cast<float>(std::max(1e-3, since_frame_.seconds()));
+  // A jump is no motion.
+  Vec3 velocity = (position - last_position_.value_or(position)) * (1 / seconds);
+  if (length(velocity) > 10 * state_.speed) velocity = {};
+  last_position_ = position;
+  if (state_.overlays.count("residency") > 0) {
+    std::vector<uint8_t> levels = level_->runtime().cell_levels();
+    marks_are_old_ |= levels != cell_levels_;
+    cell_levels_ = std::move(levels);
+  }
+  return level_->runtime().look_from(position, velocity);
+}
+
 bool Viewer::script_waits() {
-  if (exposing_ > 0 || !shot_.empty()) return true;
+  if (exposing_ > 0 || !shot_.empty() || wait_reload_) return true;
   if (wait_frames_ > 0) {
     --wait_frames_;
     return true;
@@ -117,7 +155,8 @@ bool Viewer::script_waits() {
     if (now.width == wait_size_.width && now.height == wait_size_.height) wait_size_ = {};
   }
   wait_bake_ = wait_bake_ && bake_.running();
-  return wait_bake_ || wait_size_.width > 0;
+  wait_arrival_ = wait_arrival_ && level_->runtime().arriving();
+  return wait_bake_ || wait_arrival_ || wait_size_.width > 0;
 }
 
 absl::Status Viewer::step_script() {
@@ -169,7 +208,9 @@ absl::Status Viewer::frame() {
 absl::Status Viewer::draw() {
   LL_ASSIGN_OR_RETURN(const bool has_area, screen_->fit(level_.get()));  // actions may have changed the level
   if (!has_area) return absl::OkStatus();
+  LL_RETURN_IF_ERROR(look_from_camera());
   LL_RETURN_IF_ERROR(show_marks());
+  if (level_->runtime().arriving()) quiet_ = 0;
   LL_ASSIGN_OR_RETURN(const PlayTimes before, level_->runtime().times());
   const Shot shot{state_.camera.camera(screen_->aspect()), state_.layer, state_.exposure, !shot_.empty()};
   LL_RETURN_IF_ERROR(screen_->draw(level_.get(), shot));
@@ -183,7 +224,7 @@ absl::Status Viewer::draw() {
     state_.message = "wrote " + shot_;
     shot_.clear();
   }
-  return exposing_ > 0 ? expose_anew() : absl::OkStatus();
+  return exposing_ > 0 && !level_->runtime().arriving() ? expose_anew() : absl::OkStatus();
 }
 
 absl::Status Viewer::expose_anew() {
@@ -198,12 +239,12 @@ absl::Status Viewer::expose_anew() {
 absl::Status Viewer::show_marks() {
   if (marks_are_old_) {
     const auto on = [&](const char* name) { return state_.overlays.count(name) > 0; };
-    if (owners_.half.empty() && (on("cells") || on("ranks") || on("stale"))) {
+    if (owners_.half.empty() && (on("cells") || on("ranks") || on("stale") || on("residency"))) {
       LL_ASSIGN_OR_RETURN(owners_,
                           find_owners(level_->files().loom, level_->manifest(), level_->scene(), level_->elements()));
     }
-    LL_RETURN_IF_ERROR(
-        screen_->set_overlays(overlay_marks(state_.overlays, level_->manifest(), level_->elements(), owners_)));
+    LL_RETURN_IF_ERROR(screen_->set_overlays(overlay_marks(state_.overlays, level_->manifest(), level_->elements(),
+                                                           owners_, level_->runtime().cell_levels())));
     marks_are_old_ = false;
   }
   renderer::Marks selection;

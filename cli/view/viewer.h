@@ -1,7 +1,9 @@
 // The viewer: a window, a level in it, and what is done to both, by hand or by a script.
 #pragma once
 
+#include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,6 +27,7 @@ struct ViewOptions {
   std::vector<Action> script;
   int width = 1280, height = 720, shadow_size = 0;
   float exposure = 0;  ///< 0: from the first pictures
+  float budget = 0;    ///< MB of cells and relight sets in memory; 0: no limit
   bool panel = true, validation = false;
 };
 
@@ -48,6 +51,9 @@ class Viewer {
   absl::Status draw();
   absl::Status show_marks();
   absl::Status look_after_bake();
+  /// Reloads when someone else has baked the asset anew.
+  void watch_asset();
+  absl::Status look_from_camera();
   absl::Status step_script();
   absl::Status finish_script();
   bool script_waits();
@@ -75,8 +81,9 @@ class Viewer {
   Input input_;
   State state_;
   ChildBake bake_;
-  std::string saved_;  ///< the file that holds the level as it was loaded or saved last
-  std::string baked_;  ///< the file of which the asset was baked last
+  std::string saved_;                                ///< the file that holds the level as it was loaded or saved last
+  std::string baked_;                                ///< the file of which the asset was baked last
+  std::filesystem::file_time_type manifest_time_{};  ///< of the asset that is shown
   ElementOwners owners_;
   bool marks_are_old_ = true;
 
@@ -85,10 +92,12 @@ class Viewer {
   bool done_ = false;
   size_t next_ = 0;  ///< of the script
   int wait_frames_ = 0;
-  bool wait_bake_ = false;
+  bool wait_bake_ = false, wait_reload_ = false, wait_arrival_ = false;
   VkExtent2D wait_size_{};  ///< of the window, asked for; 0: no wait
   std::string shot_;        ///< screenshot of the next frame; empty: none
-  Stopwatch since_frame_;
+  Stopwatch since_frame_, since_look_;
+  std::optional<Vec3> last_position_;  ///< of the camera, a frame ago
+  std::vector<uint8_t> cell_levels_;   ///< that the residency overlay shows
 };
 
 }  // namespace lightloom::view

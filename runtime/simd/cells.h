@@ -35,6 +35,8 @@ class Cells {
   void lambda_changed(uint32_t probe);
   /// Every active cell waits.
   void reset();
+  /// E shows some light of every cell: that of an asset before.
+  void set_lit() { lit_.fill(1); }
 
   /// Chooses at most `most` (0: all) of the cells that wait, for the next project() and receive().
   void choose(uint32_t most) { chosen_ = turns_.take(most); }

@@ -29,6 +29,7 @@ SimdRuntime::SimdRuntime(const AssetIndex& index, const SimdOptions& options)
 void SimdRuntime::inherit(const SimdRuntime& before, std::span<const AssetIndex::Kept> kept) {
   const std::scoped_lock lock(mutex_, before.mutex_);
   surface_.inherit(before.surface_, kept);
+  cells_.set_lit();
 }
 
 absl::Status SimdRuntime::load_cell(uint32_t cell, simd::PackedCell packed, bool over_base) {

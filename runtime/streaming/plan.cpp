@@ -69,8 +69,9 @@ StreamCosts::StreamCosts(const AssetIndex& index) {
   }
   // A bit per tile of 64 elements (runtime/vulkan/asset.h).
   const uint64_t tiles = 4 * (index.surface_elements() / 64 / 32 + uint64_t{1});
-  probe_[1] = 4 * coarse_rays(index.rays()).size() + tiles;
-  probe_[2] = probe_[1] + 4 * uint64_t{index.rays()} + tiles;
+  const uint64_t coarse = coarse_rays(index.rays()).size();
+  probe_[1] = 4 * coarse + tiles;
+  probe_[2] = probe_[1] + (coarse < index.rays() ? 4 * uint64_t{index.rays()} + tiles : 0);
 }
 
 std::vector<StreamStep> rank_steps(const AssetIndex& index, const StreamCosts& costs, std::span<const float> importance,
@@ -96,7 +97,7 @@ std::vector<StreamStep> rank_steps(const AssetIndex& index, const StreamCosts& c
   }
   const uint64_t probe_bytes = costs.probe(ProbeLevel::kAll) - costs.probe(ProbeLevel::kBase);
   for (uint32_t p = 0; p < index.probes().size(); ++p) {
-    if (index.cells_of(p).empty()) continue;
+    if (index.cells_of(p).empty() || probe_bytes == 0) continue;  // the base has all rays
     StreamStep s{AssetIndex::Kind::kRelight, p, static_cast<uint8_t>(ProbeLevel::kAll), probe_bytes, 0};
     s.density = kCoarseRaysError * probe_importance[p] / static_cast<double>(probe_bytes);
     if (now.probes[p] == ProbeLevel::kAll) s.density *= kHysteresis;

@@ -50,9 +50,9 @@ Streamer::Streamer(Backend* backend, ReadChunk read, StreamOptions options)
 
 void Streamer::set_view(const StreamView& view) {
   const std::lock_guard lock(mutex_);
+  if (!(view == view_)) state_.done = false;
   view_ = view;
   ++views_;
-  state_.done = false;
 }
 
 void Streamer::pin(std::vector<Aabb> boxes) {
@@ -86,7 +86,7 @@ void Streamer::look() {
       for (float& i : importance_) i *= kForget;
     }
     seen_view_ = views_;
-    view = view_;
+    seen_ = view = view_;
     pins = pins_;
   }
   unseen_ = 0;
@@ -223,11 +223,11 @@ Streamer::Progress Streamer::step() {
   if (backend_->pending_bytes() > options_.queue_bytes) return Progress::kWait;
   std::optional<Wish> wish = next_base();
   if (!wish) wish = next_step();
-  if (!wish) {
+  {
     const std::lock_guard lock(mutex_);
-    state_.done = views_ == seen_view_;
-    return state_.done ? Progress::kDone : Progress::kStep;
+    state_.done = !wish && view_ == seen_;
   }
+  if (!wish) return Progress::kDone;
   const uint64_t more = bytes_of(wish->target, wish->level) - bytes_of(wish->target, level_of(wish->target));
   if (!make_room(more) && wish->level != kBase) return Progress::kWait;
   return load(*wish);
@@ -270,22 +270,19 @@ void Streamer::note_failure(const AssetIndex::Target& target, Failure failure) {
 }
 
 Streamer::Progress Streamer::no_room(const AssetIndex::Target& target, const absl::Status& status) {
-  switch (result_of(status)) {
-    case LIGHTLOOM_ERROR_NOT_READY:
-      return Progress::kWait;
-    case LIGHTLOOM_ERROR_OVER_BUDGET:
-    case LIGHTLOOM_ERROR_OUT_OF_MEMORY:
-      break;
-    default:
-      return put_off(target, status);
+  const lightloom_result result = result_of(status);
+  const bool in_use = result == LIGHTLOOM_ERROR_NOT_READY;
+  if (!in_use && result != LIGHTLOOM_ERROR_OVER_BUDGET && result != LIGHTLOOM_ERROR_OUT_OF_MEMORY) {
+    return put_off(target, status);
   }
-  // What was dropped is free some frames later. If that does not help, this is all there is.
+  // What was dropped is free some frames later.
   if (!no_room_since_) no_room_since_ = seen_view_;
-  if (seen_view_ - *no_room_since_ > kPatience) {
-    no_room_since_.reset();
-    budget_ = state_.bytes;
-    unseen_ = kSights;
-  }
+  if (seen_view_ - *no_room_since_ <= kPatience) return Progress::kWait;
+  no_room_since_.reset();
+  if (in_use) return put_off(target, status);
+  // This is all there is.
+  budget_ = state_.bytes;
+  unseen_ = kSights;
   return Progress::kWait;
 }
 

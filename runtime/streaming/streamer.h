@@ -17,6 +17,8 @@ namespace lightloom {
 struct StreamView {
   Vec3 position;
   Vec3 velocity;  ///< metres per second: where the camera will be soon is looked at too
+
+  bool operator==(const StreamView&) const = default;
 };
 
 struct StreamOptions {
@@ -105,6 +107,7 @@ class Streamer {
   std::vector<bool> surfaces_;
   uint32_t unseen_ = 1;  ///< what sight_ has learnt since the last look
   uint64_t seen_view_ = UINT64_MAX;
+  StreamView seen_;                        ///< of the last look
   uint64_t budget_;                        ///< less than the options' if the backend has no room for that
   std::optional<uint64_t> no_room_since_;  ///< view
 

@@ -174,6 +174,8 @@ absl::Status VulkanAsset::record_uploads(VkCommandBuffer commands, uint32_t fram
     if (!inherited_parts_.empty()) {
       vk.CmdCopyBuffer(commands, inherited_.handle(), irradiance_.handle(),
                        static_cast<uint32_t>(inherited_parts_.size()), inherited_parts_.data());
+      // Cells fade from that light to their own.
+      vk.CmdFillBuffer(commands, cell_seen_.handle(), 0, VK_WHOLE_SIZE, UINT32_MAX);
     }
     inherited_until_ = frame + context_->frames;
   }

@@ -1,8 +1,10 @@
 // What cells of fewer columns and bands, and probes of fewer rays, do to E: the table of docs/results.md, "Streaming".
+// LIGHTLOOM_BENCH_LEVEL: a built-in level, else the gallery.
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 
 #include "core/base/sh.h"
 #include "core/scene/builtin.h"
@@ -21,7 +23,8 @@ struct Result {
 };
 
 TEST(DetailsBench, ErrorAgainstBytes) {
-  const auto level = test::bake_level(value_or_die(builtin_scene("gallery")), BakeParams{});
+  const char* const name = std::getenv("LIGHTLOOM_BENCH_LEVEL");
+  const auto level = test::bake_level(value_or_die(builtin_scene(name == nullptr ? "gallery" : name)), BakeParams{});
   const SurfaceInputs inputs = value_or_die(light_surfaces(*level->tracer, level->elements, 4, {}));
   const ChunkStore store = chunk_store(level->loom());
   const AssetSource source = value_or_die(AssetSource::open(

@@ -58,12 +58,14 @@ TEST_F(BakedOverlays, MarksAreOneForEachThingThatIsShown) {
   const auto owners = *find_owners(level().loom(), manifest, *level().scene, level().elements);
   const size_t receivers = level().elements.receivers.all.size();
   const auto marks = [&](const std::set<std::string>& shown) {
-    return overlay_marks(shown, manifest, level().elements, owners);
+    return overlay_marks(shown, manifest, level().elements, owners, std::vector<uint8_t>(manifest.cells.size(), 1));
   };
   EXPECT_TRUE(marks({"panel", "lights"}).lines.empty());
   EXPECT_EQ(marks({"cells"}).lines.size(), 24 * manifest.cells.size());
   EXPECT_EQ(marks({"cells"}).triangles.size(), 6 * receivers);
   EXPECT_EQ(marks({"ranks"}).triangles.size(), 6 * receivers);
+  EXPECT_EQ(marks({"residency"}).triangles.size(), 6 * receivers);
+  EXPECT_EQ(marks({"residency"}).lines[0].colour[0], 230);  // all have their base
   EXPECT_EQ(marks({"probes"}).triangles.size(), 24 * manifest.probes.size());
 }
 
@@ -73,7 +75,7 @@ TEST_F(BakedOverlays, StaleCellsAreRedderTheMoreOfThemChanged) {
   manifest.cells[1].stale = 0.01f;
   manifest.cells[2].stale = 0.02f;
   const auto owners = *find_owners(level().loom(), manifest, *level().scene, level().elements);
-  const auto lines = overlay_marks({"stale"}, manifest, level().elements, owners).lines;
+  const auto lines = overlay_marks({"stale"}, manifest, level().elements, owners, {}).lines;
   const auto colour_of = [&](size_t cell) { return lines[24 * cell].colour; };
   EXPECT_GT(colour_of(0)[1], colour_of(0)[0]);  // fresh: green
   EXPECT_EQ(colour_of(2), (Rgba{255, 0, 0, colour_of(2)[3]}));

@@ -36,7 +36,9 @@ TEST(Script, ReadsEveryCommand) {
       "exposure 0\n"
       "resize 800 600\n"
       "screenshot shot.png\n"
-      "quit");
+      "quit\n"
+      "wait-reload\n"
+      "wait-arrival");
   ASSERT_TRUE(script.ok()) << script.status();
   std::vector<Verb> verbs;
   for (const Action& action : *script) verbs.push_back(action.verb);

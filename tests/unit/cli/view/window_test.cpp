@@ -137,7 +137,7 @@ TEST_F(ViewWindow, EditsAreSavedBakedAndShown) {
       "click 0.6 0.75\n"  // the short box
       "move 0 1 0\nduplicate\nmove -1.5 0 0\n"
       "pick \"tall box\"\ndelete\nwait 8\nscreenshot edited.png\n"
-      "rebake\nwait-bake\nwait 16\nscreenshot baked.png\nquit\n",
+      "rebake\nwait-bake\nwait-arrival\nwait 26\nscreenshot baked.png\nquit\n",
       {"--no-panel", "--save-as", path("mine.glb")});
   EXPECT_GT(difference(shot("first.png"), shot("edited.png")), 3);
   EXPECT_GT(difference(shot("edited.png"), shot("baked.png")), 0.5);
@@ -160,7 +160,7 @@ TEST_F(ViewWindow, EditsAreSavedBakedAndShown) {
 TEST_F(ViewWindow, ReloadDropsWhatWasEdited) {
   loom_ = baked();
   views("screenshot first.png\npick \"tall box\"\nmove 1 0 -1\nsave " + path("moved.glb") +
-            "\nwait 4\nscreenshot moved.png\nreload\nwait 16\nscreenshot again.png\nquit\n",
+            "\nwait 4\nscreenshot moved.png\nreload\nwait-arrival\nwait 26\nscreenshot again.png\nquit\n",
         {"--no-panel"});
   EXPECT_GT(difference(shot("first.png"), shot("moved.png")), 2);
   EXPECT_LT(difference(shot("first.png"), shot("again.png")), 0.5);

@@ -123,6 +123,21 @@ TEST_P(StreamTest, WithoutABudgetAllOfItArrives) {
   EXPECT_EQ(reader_.reads, reads);
 }
 
+/// Then a base has all rays, and there is nothing above it.
+TEST_P(StreamTest, ProbesOfFewRays) {
+  testing::RandomAssetOptions o;
+  o.relight_rays = 64;
+  asset_ = testing::random_asset(o);
+  manifest_ = encode_manifest(asset_.manifest);
+  light_ = testing::random_light((*asset_.open()).surface_elements(), 5);
+  ASSERT_EQ(lightloom_load_manifest(runtime_.get(), manifest_.data(), manifest_.size()), LIGHTLOOM_OK);
+  runtime_.light(light_);
+  create(LIGHTLOOM_STREAM_NO_THREAD);
+  finish();
+  EXPECT_EQ(state().done, 1u);
+  EXPECT_LT(p999_error(settled(), whole()), 1e-4);
+}
+
 TEST_P(StreamTest, WithATinyBudgetNothingIsBlack) {
   create(LIGHTLOOM_STREAM_NO_THREAD, 1);
   finish();
