@@ -77,8 +77,8 @@ absl::Status LiveRuntime::start_stream(const std::filesystem::path& loom) {
   return absl::OkStatus();
 }
 
-absl::Status LiveRuntime::reload(const Scene& scene, const std::filesystem::path& loom) {
-  LL_ASSIGN_OR_RETURN(const auto manifest, read_file(loom / "manifest"));
+absl::Status LiveRuntime::reload(const Scene& scene, const std::filesystem::path& loom,
+                                 std::span<const uint8_t> manifest) {
   stream_.reset();
   LL_RETURN_IF_ERROR(messages_.status(lightloom_reload_manifest(runtime_.get(), manifest.data(), manifest.size())));
   scene_ = &scene;

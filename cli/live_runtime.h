@@ -6,6 +6,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <span>
 
 #include "cli/loom_runtime.h"
 #include "core/scene/scene.h"
@@ -22,10 +23,10 @@ class LiveRuntime {
   /// With the asset loaded. Keeps references to `gpu` and `scene`, of which lights may change between frames.
   static absl::StatusOr<std::unique_ptr<LiveRuntime>> create(const renderer::Gpu& gpu, const Scene& scene,
                                                              const std::filesystem::path& loom, const Options& options);
-  /// The asset was baked anew, from `scene`, which has the lights of before: chunks come anew, and until then what stays of
+  /// The asset was baked anew, to `manifest`, from `scene`, which has the lights of before: chunks come anew, and until then what stays of
   /// the level goes on as it was lit. Only of a runtime that streams. No frame may be running. After a failure it is of
   /// no use any more.
-  absl::Status reload(const Scene& scene, const std::filesystem::path& loom);
+  absl::Status reload(const Scene& scene, const std::filesystem::path& loom, std::span<const uint8_t> manifest);
 
   /// Each frame of a runtime that streams.
   absl::Status look_from(Vec3 position, Vec3 velocity);

@@ -22,11 +22,19 @@ absl::Status Backend::reload_manifest(std::span<const uint8_t> bytes) {
   LL_ASSIGN_OR_RETURN(const Manifest manifest, decode_manifest(bytes));
   LL_ASSIGN_OR_RETURN(const std::shared_ptr<const AssetIndex> index, AssetIndex::create_shared(manifest, memory_));
   const std::vector<AssetIndex::Kept> kept = loaded() ? index->kept_from(*index_) : std::vector<AssetIndex::Kept>();
-  if (const absl::Status started = start(index, kept); !started.ok()) {
+  std::vector<SurfaceKeys> keys(index->objects().size());
+  absl::Status started;
+  try {
+    started = start(index, kept);
+  } catch (...) {
+    unload();
+    throw;
+  }
+  if (!started.ok()) {
     unload();
     return started;
   }
-  keys_.assign(index->objects().size(), nullptr);
+  keys_.swap(keys);
   index_ = index;
   return absl::OkStatus();
 }

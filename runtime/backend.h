@@ -66,7 +66,7 @@ class Backend {
   virtual absl::Status read_irradiance(std::span<float> rgb) = 0;
   virtual lightloom_counts counts() const = 0;
   virtual lightloom_stats stats() const = 0;
-  /// Loaded, but not yet part of a recorded frame.
+  /// Of chunks: loaded, but not yet part of a recorded frame.
   virtual uint64_t pending_bytes() const = 0;
 
  protected:

@@ -19,11 +19,13 @@ double turn(double x) { return x - std::floor(x); }
 
 void limit(CellChunk* chunk, const Detail& detail) {
   const size_t stride = static_cast<size_t>(sh_stride(static_cast<int>(chunk->order)));
+  const bool all_bands = detail.bands > chunk->order;
   chunk->order = std::min(chunk->order, std::max(detail.bands, 1u) - 1);
   const size_t count = static_cast<size_t>(sh_count(static_cast<int>(chunk->order)));
   const size_t new_stride = static_cast<size_t>(sh_stride(static_cast<int>(chunk->order)));
   for (CellChunk::Cluster& c : chunk->clusters) {
     const size_t rank = std::min(c.rank(), detail.max_rank);
+    if (rank == c.rank() && all_bands) continue;
     c.correction.resize(rank);
     c.reconstruction.resize(rank * ((c.receivers + size_t{7}) / 8 * 8));
     std::vector<Half> projection(rank * c.probes.size() * new_stride);

@@ -43,7 +43,7 @@ bool SimdBackend::resident(const AssetIndex::Target& target, const Detail& detai
       break;
   }
   const Details& d = target.kind == AssetIndex::Kind::kCell ? cells_[target.index] : probes_[target.index];
-  return d.now == detail || d.base == detail;
+  return d.has(detail);
 }
 
 void SimdBackend::unload_target(const AssetIndex::Target& target) {
@@ -99,6 +99,7 @@ absl::Status SimdBackend::load_relight(uint32_t probe, std::span<const uint32_t>
   }
   simd::PackedProbe packed = runtime_->pack_probe(rays);
   const std::lock_guard lock(mutex_);
+  if (probes_[probe].has(detail)) return absl::OkStatus();
   LL_ASSIGN_OR_RETURN(const bool over_base, goes_over_base(probes_[probe], detail));
   LL_RETURN_IF_ERROR(check_budget(packed.bytes(), over_base ? 0 : runtime_->probe_bytes(probe)));
   runtime_->load_probe(probe, std::move(packed), over_base);
@@ -109,6 +110,7 @@ absl::Status SimdBackend::load_relight(uint32_t probe, std::span<const uint32_t>
 absl::Status SimdBackend::load_cell(uint32_t cell, const SourceCell& source, const Detail& detail) {
   simd::PackedCell packed = runtime_->pack_cell(source);
   const std::lock_guard lock(mutex_);
+  if (cells_[cell].has(detail)) return absl::OkStatus();
   LL_ASSIGN_OR_RETURN(const bool over_base, goes_over_base(cells_[cell], detail));
   LL_RETURN_IF_ERROR(check_budget(packed.bytes(), over_base ? 0 : runtime_->cell_bytes(cell)));
   LL_RETURN_IF_ERROR(runtime_->load_cell(cell, std::move(packed), over_base));

@@ -56,6 +56,7 @@ class SimdBackend final : public Backend {
   /// What is resident of a chunk.
   struct Details {
     std::optional<Detail> now, base;
+    bool has(const Detail& detail) const { return now == detail || base == detail; }
   };
   /// Whether another one is to be loaded over what is there.
   static absl::StatusOr<bool> goes_over_base(const Details& details, const Detail& detail);

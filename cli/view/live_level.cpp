@@ -4,6 +4,7 @@
 
 #include "cli/progress.h"
 #include "cli/scene_edit.h"
+#include "core/base/file.h"
 #include "core/base/text.h"
 
 namespace lightloom::view {
@@ -50,7 +51,9 @@ absl::StatusOr<std::unique_ptr<LiveLevel>> LiveLevel::load_again(LiveLevel* befo
 }
 
 absl::Status LiveLevel::start(LiveLevel* before) {
-  LL_ASSIGN_OR_RETURN(manifest_, read_manifest(files_.loom));
+  // Read once: an asset may be baked anew at any time.
+  LL_ASSIGN_OR_RETURN(const std::vector<uint8_t> manifest, read_file(std::filesystem::path(files_.loom) / "manifest"));
+  LL_ASSIGN_OR_RETURN(manifest_, decode_manifest(manifest));
   bool keep = before != nullptr;
   LL_ASSIGN_OR_RETURN(level_, load_level(files_.scene, files_.lights, files_.rig, [&](Scene* scene) {
                         keep = keep && same_kinds(before->scene().lights, scene->lights);
@@ -63,9 +66,9 @@ absl::Status LiveLevel::start(LiveLevel* before) {
                       surface_materials(*level_.tracer, elements_, kMaterialSamples, bar.parallel("materials", 0)));
   bar.finish();
   if (keep) {
-    // From here on `before` has no runtime; with other lights it keeps its own, which has room for those.
+    // From here on `before` is of no use; with other lights it keeps its runtime, which has room for those only.
     runtime_ = std::move(before->runtime_);
-    LL_RETURN_IF_ERROR(runtime_->reload(scene(), files_.loom));
+    LL_RETURN_IF_ERROR(runtime_->reload(scene(), files_.loom, manifest));
   } else {
     LL_ASSIGN_OR_RETURN(runtime_, LiveRuntime::create(*gpu_, scene(), files_.loom, {true, byte_budget_}));
   }

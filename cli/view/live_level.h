@@ -31,9 +31,11 @@ class LiveLevel {
   static absl::StatusOr<std::unique_ptr<LiveLevel>> load(renderer::Gpu* gpu, const LevelFiles& files,
                                                          uint32_t shadow_size, uint64_t byte_budget = 0);
   /// The level from `scene`, baked anew, in place of `before`, whose lights (if they are of the same kinds), colours and
-  /// runtime it takes over: what has stayed goes on as it was lit. If the level cannot be read, `before` stays as it is.
+  /// runtime it takes over: what has stayed goes on as it was lit. If the level cannot be read, `before` stays as it is; if
+  /// what is read cannot be shown, `before` is gone too: !before->works().
   static absl::StatusOr<std::unique_ptr<LiveLevel>> load_again(LiveLevel* before, const std::string& scene);
 
+  bool works() const { return runtime_ != nullptr; }
   const LevelFiles& files() const { return files_; }
   const Scene& scene() const { return *level_.scene; }
   const Manifest& manifest() const { return manifest_; }

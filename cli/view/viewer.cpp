@@ -78,8 +78,10 @@ absl::Status Viewer::begin_at_camera() {
 
 absl::Status Viewer::reload(const std::string& scene) {
   manifest_time_ = time_of_manifest(options_.files.loom);  // before it is read: a later one is news
-  LL_ASSIGN_OR_RETURN(auto fresh, LiveLevel::load_again(level_.get(), scene));
-  level_ = std::move(fresh);
+  auto fresh = LiveLevel::load_again(level_.get(), scene);
+  if (!fresh.ok() && !level_->works()) fatal_ = fresh.status();
+  LL_RETURN_IF_ERROR(fresh.status());
+  level_ = *std::move(fresh);
   saved_ = baked_ = scene;
   state_.picked.reset();
   owners_ = {};
@@ -97,7 +99,9 @@ absl::Status Viewer::run() {
     if (news && idle) quiet_ = std::min(quiet_, kQuiet - kAfterNews);
     LL_RETURN_IF_ERROR(look_after_bake());
     watch_asset();
+    LL_RETURN_IF_ERROR(fatal_);
     LL_RETURN_IF_ERROR(step_script());
+    LL_RETURN_IF_ERROR(fatal_);
     const bool asleep = quiet_ > kQuiet && !bake_.running();  // a bake has progress to show, now and then
     if (!done_ && !asleep) LL_RETURN_IF_ERROR(frame());
   }
@@ -201,7 +205,10 @@ absl::Status Viewer::frame() {
   screen_->ui().end();
   actions.insert(actions.end(), by_hand.begin(), by_hand.end());
   quiet_ = input_.busy() ? 0 : quiet_ + 1;
-  for (const Action& action : actions) act_by_hand(action);
+  for (const Action& action : actions) {
+    act_by_hand(action);
+    LL_RETURN_IF_ERROR(fatal_);
+  }
   return draw();
 }
 

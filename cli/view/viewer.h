@@ -81,6 +81,7 @@ class Viewer {
   Input input_;
   State state_;
   ChildBake bake_;
+  absl::Status fatal_;                               ///< there is nothing left to show
   std::string saved_;                                ///< the file that holds the level as it was loaded or saved last
   std::string baked_;                                ///< the file of which the asset was baked last
   std::filesystem::file_time_type manifest_time_{};  ///< of the asset that is shown

@@ -218,7 +218,8 @@ typedef struct lightloom_stream_info {
   uint64_t queue_bytes; /* nothing is read while more than this waits to be uploaded; 0: 8 MiB */
 } lightloom_stream_info;
 
-/* A manifest must be loaded, and not be replaced before the stream is destroyed. *out is null on failure. */
+/* A manifest must be loaded, with no cell or relight set resident; destroy the stream before the manifest is replaced and
+ * before the runtime. *out is null on failure. */
 LIGHTLOOM_API lightloom_result lightloom_stream_create(lightloom_runtime* runtime, const lightloom_stream_info* info,
                                                        lightloom_stream** out);
 /* Waits for a read that is going on. What is resident stays. Null is fine. */
@@ -245,10 +246,10 @@ LIGHTLOOM_API lightloom_result lightloom_stream_work(lightloom_stream* stream, u
 
 typedef struct lightloom_stream_state {
   uint32_t struct_size;                       /* in: sizeof; the fields that fit are filled */
-  uint32_t done;                              /* 1: all that the view needs and the budget holds is there */
+  uint32_t done;                              /* 1: all that the view needs and the budget holds is there, or failing */
   uint32_t base_cells, some_cells, all_cells; /* resident at exactly that level */
   uint32_t base_probes, all_probes;
-  uint32_t failing;                        /* chunks that could not be read, and are tried again later */
+  uint32_t failing;                        /* chunks that could not be read or had no room, and are tried again later */
   uint64_t bytes;                          /* that cells and relight sets take, about */
   uint64_t read_bytes, read_chunks, drops; /* so far */
 } lightloom_stream_state;

@@ -51,8 +51,8 @@ class StreamThread {
     }
     try {
       return streamer_->step() == Streamer::Progress::kStep;
-    } catch (const std::bad_alloc&) {
-      return false;  // the next frame tries again
+    } catch (...) {
+      return false;  // no memory; the next view tries again
     }
   }
 
@@ -103,6 +103,11 @@ lightloom_result lightloom_stream_create(lightloom_runtime* runtime, const light
   *out = nullptr;
   return lightloom::with_asset(runtime, [&](lightloom::Backend& backend) -> absl::Status {
     LL_RETURN_IF_ERROR(lightloom::check_info(info));
+    const lightloom_counts counts = backend.counts();
+    if (counts.resident_cells + counts.resident_probes > 0) {
+      return absl::InvalidArgumentError(
+          "a stream loads all itself: load the manifest anew, or unload what is resident");
+    }
     auto stream = std::make_unique<lightloom_stream>();
     stream->messages = runtime->messages;
     lightloom::StreamOptions options;
@@ -130,8 +135,8 @@ void lightloom_stream_destroy(lightloom_stream* stream) { delete stream; }
 lightloom_result lightloom_stream_set_view(lightloom_stream* stream, const lightloom_stream_view* view) {
   if (stream == nullptr) return LIGHTLOOM_ERROR_INVALID_ARGUMENT;
   return guarded(stream->messages, [&]() -> absl::Status {
-    if (view == nullptr || view->struct_size < sizeof *view || !lightloom::finite(view->position, 3) ||
-        !lightloom::finite(view->velocity, 3)) {
+    if (view == nullptr || view->struct_size < sizeof *view || view->reserved != 0 ||
+        !lightloom::finite(view->position, 3) || !lightloom::finite(view->velocity, 3)) {
       return absl::InvalidArgumentError("lightloom_stream_view is null, its struct_size is wrong or it is not finite");
     }
     stream->streamer->set_view({lightloom::vec(view->position), lightloom::vec(view->velocity)});

@@ -120,10 +120,17 @@ StreamLevels choose_levels(const AssetIndex& index, const StreamCosts& costs, st
     levels.probes[p] = ProbeLevel::kBase;
     used += costs.probe(ProbeLevel::kBase);
   }
+  // What does not fit is passed over, and what lies above it in the same cell.
+  std::vector<bool> stopped(levels.cells.size());
   for (const StreamStep& s : steps) {
-    if (s.density <= 0 || used + s.bytes > budget) break;
+    if (s.density <= 0) break;
+    const bool is_cell = s.kind == AssetIndex::Kind::kCell;
+    if (used + s.bytes > budget || (is_cell && stopped[s.index])) {
+      if (is_cell) stopped[s.index] = true;
+      continue;
+    }
     used += s.bytes;
-    if (s.kind == AssetIndex::Kind::kCell) {
+    if (is_cell) {
       levels.cells[s.index] = static_cast<CellLevel>(s.level);
     } else {
       levels.probes[s.index] = static_cast<ProbeLevel>(s.level);

@@ -52,7 +52,7 @@ struct StreamStep {
 std::vector<StreamStep> rank_steps(const AssetIndex& index, const StreamCosts& costs, std::span<const float> importance,
                                    const StreamLevels& now);
 
-/// Bases everywhere, and the first steps that fit `budget` together.
+/// Bases everywhere, and the best steps that fit `budget` together.
 StreamLevels choose_levels(const AssetIndex& index, const StreamCosts& costs, std::span<const StreamStep> steps,
                            uint64_t budget);
 

@@ -20,10 +20,18 @@ constexpr Ahead kAhead[] = {{0, 1}, {0.5f, 0.5f}, {1, 0.25f}};
 /// What was important is still a bit, less with each view: about the least recently needed goes first.
 constexpr float kRecent = 0.1f, kForget = 0.95f;
 constexpr float kPinned = 1000;
-/// Views without success after which a backend without room is taken at its word.
-constexpr uint64_t kPatience = 30;
+/// Views for which the budget is what the backend has room for, before more is tried again.
+constexpr uint64_t kSqueezed = 600;
+/// Views of one place after which it is looked at again: what was important before is forgotten by then.
+constexpr uint64_t kStill = 16;
 /// Bases that are loaded between two looks.
 constexpr uint32_t kSights = 64;
+
+/// And not of the memory, or of another chunk that must come first.
+bool is_of_the_chunk(lightloom_result result) {
+  return result != LIGHTLOOM_ERROR_NOT_READY && result != LIGHTLOOM_ERROR_OVER_BUDGET &&
+         result != LIGHTLOOM_ERROR_OUT_OF_MEMORY;
+}
 
 constexpr uint8_t kBase = 1;
 static_assert(static_cast<uint8_t>(CellLevel::kBase) == kBase && static_cast<uint8_t>(ProbeLevel::kBase) == kBase);
@@ -58,6 +66,7 @@ void Streamer::set_view(const StreamView& view) {
 void Streamer::pin(std::vector<Aabb> boxes) {
   const std::lock_guard lock(mutex_);
   pins_ = std::move(boxes);
+  pins_are_new_ = true;
   ++views_;
   state_.done = false;
 }
@@ -81,13 +90,22 @@ void Streamer::look() {
   std::vector<Aabb> pins;
   {
     const std::lock_guard lock(mutex_);
-    if (seen_view_ == views_ && !looks_again()) return;
-    if (seen_view_ != views_) {
-      for (float& i : importance_) i *= kForget;
-    }
+    const bool again = looks_again();
+    if (seen_view_ == views_ && !again) return;
+    // What was put off may be due.
+    next_surface_ = next_base_ = next_step_ = 0;
+    const bool news = again || !(view_ == seen_) || pins_are_new_ || views_ - looked_view_ >= kStill;
     seen_view_ = views_;
+    if (!news) return;
+    looked_view_ = views_;
+    pins_are_new_ = false;
     seen_ = view = view_;
     pins = pins_;
+  }
+  for (float& i : importance_) i *= kForget;
+  if (squeezed_until_ && seen_view_ >= *squeezed_until_) {
+    squeezed_until_.reset();
+    budget_ = options_.budget;
   }
   unseen_ = 0;
   std::vector<float> seen(index_.cells().size());
@@ -108,7 +126,6 @@ void Streamer::look() {
             [&](uint32_t a, uint32_t b) { return seen[a] != seen[b] ? seen[a] > seen[b] : a < b; });
   steps_ = rank_steps(index_, costs_, seen, now_);
   want_ = choose_levels(index_, costs_, steps_, budget_);
-  next_surface_ = next_base_ = next_step_ = 0;
 }
 
 const ChunkRef& Streamer::ref_of(const AssetIndex::Target& target) const {
@@ -222,6 +239,7 @@ Streamer::Progress Streamer::step() {
   look();
   if (backend_->pending_bytes() > options_.queue_bytes) return Progress::kWait;
   std::optional<Wish> wish = next_base();
+  if (!wish && looks_again()) look();  // all sights are known now
   if (!wish) wish = next_step();
   {
     const std::lock_guard lock(mutex_);
@@ -257,7 +275,6 @@ Streamer::Progress Streamer::load(const Wish& wish) {
   status = backend_->load(*std::move(chunk), detail);
   if (!status.ok()) return no_room(wish.target, status);
   set_level(wish.target, wish.level);
-  no_room_since_.reset();
   note_failure(wish.target, {});
   return Progress::kStep;
 }
@@ -271,25 +288,23 @@ void Streamer::note_failure(const AssetIndex::Target& target, Failure failure) {
 
 Streamer::Progress Streamer::no_room(const AssetIndex::Target& target, const absl::Status& status) {
   const lightloom_result result = result_of(status);
-  const bool in_use = result == LIGHTLOOM_ERROR_NOT_READY;
-  if (!in_use && result != LIGHTLOOM_ERROR_OVER_BUDGET && result != LIGHTLOOM_ERROR_OUT_OF_MEMORY) {
-    return put_off(target, status);
+  const bool full = result == LIGHTLOOM_ERROR_OVER_BUDGET || result == LIGHTLOOM_ERROR_OUT_OF_MEMORY;
+  if (!full && result != LIGHTLOOM_ERROR_NOT_READY) return put_off(target, status);
+  // Uploads that are to come free what they replace, and what was dropped is free some frames later.
+  if (backend_->pending_bytes() > 0) return Progress::kWait;
+  if (full && failures_[number_of(target)].times > 0) {
+    // There was time enough: this is all there is, for now.
+    budget_ = state_.bytes;
+    squeezed_until_ = seen_view_ + kSqueezed;
+    unseen_ = kSights;
   }
-  // What was dropped is free some frames later.
-  if (!no_room_since_) no_room_since_ = seen_view_;
-  if (seen_view_ - *no_room_since_ <= kPatience) return Progress::kWait;
-  no_room_since_.reset();
-  if (in_use) return put_off(target, status);
-  // This is all there is.
-  budget_ = state_.bytes;
-  unseen_ = kSights;
-  return Progress::kWait;
+  return put_off(target, status);
 }
 
-/// Others go on meanwhile. A chunk whose objects' surfaces could not be read has nothing to report of its own.
+/// Others go on meanwhile.
 Streamer::Progress Streamer::put_off(const AssetIndex::Target& target, const absl::Status& status) {
   const uint32_t times = failures_[number_of(target)].times + 1;
-  if (times == 1 && options_.report && result_of(status) != LIGHTLOOM_ERROR_NOT_READY) options_.report(status);
+  if (times == 1 && options_.report && is_of_the_chunk(result_of(status))) options_.report(status);
   note_failure(target, {times, seen_view_ + (uint64_t{16} << std::min(times, 10u))});
   return Progress::kStep;
 }

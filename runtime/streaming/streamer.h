@@ -34,10 +34,10 @@ struct StreamState {
   uint32_t surfaces = 0;                                   ///< resident
   uint32_t base_cells = 0, some_cells = 0, all_cells = 0;  ///< at exactly that level
   uint32_t base_probes = 0, all_probes = 0;
-  uint32_t failing = 0;  ///< chunks that could not be read the last time
+  uint32_t failing = 0;  ///< chunks that could not be had the last time
   uint64_t bytes = 0, budget = 0;
   uint64_t read_bytes = 0, read_chunks = 0, drops = 0;  ///< so far
-  bool done = false;                                    ///< all that this view needs and the budget holds is there
+  bool done = false;  ///< all that this view needs and the budget holds is there, or was put off
 };
 
 /// step() is for one thread at a time; the rest is for any.
@@ -107,13 +107,15 @@ class Streamer {
   std::vector<bool> surfaces_;
   uint32_t unseen_ = 1;  ///< what sight_ has learnt since the last look
   uint64_t seen_view_ = UINT64_MAX;
-  StreamView seen_;                        ///< of the last look
-  uint64_t budget_;                        ///< less than the options' if the backend has no room for that
-  std::optional<uint64_t> no_room_since_;  ///< view
+  StreamView seen_;                         ///< of the last look
+  uint64_t budget_;                         ///< less than the options' if the backend has no room for that
+  std::optional<uint64_t> squeezed_until_;  ///< a view
+  uint64_t looked_view_ = 0;
 
   mutable std::mutex mutex_;  ///< guards all below; taken after nothing else
   StreamView view_;
   std::vector<Aabb> pins_;
+  bool pins_are_new_ = false;
   uint64_t views_ = 0;  ///< how often the view was set
   StreamLevels now_;
   StreamState state_;

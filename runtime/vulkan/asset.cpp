@@ -8,7 +8,6 @@
 
 #include "runtime/boundary.h"
 #include "runtime/resident.h"
-#include "runtime/rounding.h"
 
 namespace lightloom {
 namespace {
@@ -142,9 +141,15 @@ absl::Status VulkanAsset::load_relight(uint32_t probe, std::span<const uint32_t>
   if (p.has(detail)) return absl::OkStatus();
   LL_RETURN_IF_ERROR(p.check(detail));
   // The memory that the upload needs, before the slot is taken.
-  graves_.reserve(graves_.size() + uploads_.size() + 2);
+  make_room_for_graves();
   uploads_.push({target, VK_NULL_HANDLE, 0, std::move(data), 0, 0, true, false});
-  const absl::StatusOr<uint32_t> slot = relight_pools_->allocate(detail.all_rays ? 0 : relight_pools_->kinds() - 1);
+  absl::StatusOr<uint32_t> slot = absl::InternalError("");
+  try {
+    slot = relight_pools_->allocate(detail.all_rays ? 0 : relight_pools_->kinds() - 1);
+  } catch (...) {
+    uploads_.pop_newest();
+    throw;
+  }
   if (!slot.ok()) {
     uploads_.pop_newest();
     return slot.status();
@@ -156,6 +161,7 @@ absl::Status VulkanAsset::load_relight(uint32_t probe, std::span<const uint32_t>
     bury(*p.next);
   }
   p.next = {detail, *slot};
+  ++lit_;
   touch();
   return absl::OkStatus();
 }
@@ -187,25 +193,22 @@ void VulkanAsset::drop_relight_detail(uint32_t probe) {
   for (const uint32_t c : index_.cells_of(probe)) refresh_cell(c, true);
 }
 
-void VulkanAsset::bury(const LitProbe& probe) { graves_.push_back({recorded_ + context_->frames, probe.slot, {}}); }
+/// Before a version is made: then no burial needs memory, whenever it comes.
+void VulkanAsset::make_room_for_graves() { graves_.reserve(graves_.size() + lit_ + 1); }
 
-void VulkanAsset::bury(const LitCell& lit, uint32_t cell) {
-  graves_.push_back(
-      {recorded_ + context_->frames, std::nullopt, lit.place, lit.first_probe, index_.cells()[cell].probes});
+void VulkanAsset::bury(const LitProbe& probe) {
+  graves_.push_back({recorded_ + context_->frames, probe.slot, {}});
+  --lit_;
 }
 
-/// Memory for a cell and its probe list.
-absl::StatusOr<VulkanAsset::LitCell> VulkanAsset::place_cell(uint32_t cell, const CellBlock& block) {
+void VulkanAsset::bury(const LitCell& cell) {
+  graves_.push_back({recorded_ + context_->frames, std::nullopt, cell.place});
+  --lit_;
+}
+
+absl::StatusOr<VulkanAsset::LitCell> VulkanAsset::place_cell(const CellBlock& block) {
   LitCell lit;
-  const std::optional<uint64_t> list = lists_->allocate(index_.cells()[cell].probes);
-  if (!list) return not_ready("what was unloaded is still in use; record frames_in_flight more frames");
-  lit.first_probe = static_cast<uint32_t>(*list);
-  const absl::StatusOr<CellPools::Place> place = cell_pools_->allocate(block.bytes);
-  if (!place.ok()) {
-    lists_->release(*list, index_.cells()[cell].probes);
-    return place.status();
-  }
-  lit.place = *place;
+  LL_ASSIGN_OR_RETURN(lit.place, cell_pools_->allocate(block.bytes));
   lit.jobs = block.jobs;
   lit.octets = block.octets;
   lit.project_quads = static_cast<uint32_t>(block.projection_bytes / 16);
@@ -216,55 +219,40 @@ absl::StatusOr<VulkanAsset::LitCell> VulkanAsset::place_cell(uint32_t cell, cons
 absl::Status VulkanAsset::load_cell(uint32_t cell, const SourceCell& source, const Detail& detail) {
   LL_ASSIGN_OR_RETURN(CellBlock block, make_cell_block(source, context_->page_bytes, memory_));
   std::pmr::vector<uint32_t> elements(source.elements.begin(), source.elements.end(), memory_);
-  std::pmr::vector<uint8_t> list(memory_);
-  append(&list, source.probes.data(), source.probes.size());
 
   const AssetIndex::Target target{AssetIndex::Kind::kCell, cell};
   const std::lock_guard lock(mutex_);
   Cell& c = cells_[cell];
   if (c.has(detail)) return absl::OkStatus();
   LL_RETURN_IF_ERROR(c.check(detail));
-  // The memory that the uploads need, before anything else changes.
-  graves_.reserve(graves_.size() + uploads_.size() + 3);
-  const uint32_t uploads = list.empty() ? 1 : 2;
-  if (!list.empty()) uploads_.push({target, cell_probes_.handle(), 0, std::move(list), 0, 0, false, false});
-  try {
-    uploads_.push({target, VK_NULL_HANDLE, 0, std::move(block.data), 0, 0, true, false});
-  } catch (...) {
-    if (uploads == 2) uploads_.pop_newest();
-    throw;
-  }
-  const auto give_up = [&] {
-    for (uint32_t u = 0; u < uploads; ++u) uploads_.pop_newest();
-  };
+  // The memory that the upload needs, before anything else changes.
+  make_room_for_graves();
+  uploads_.push({target, VK_NULL_HANDLE, 0, std::move(block.data), 0, 0, true, false});
   absl::StatusOr<LitCell> lit = absl::InternalError("");
   try {
-    lit = place_cell(cell, block);
+    lit = place_cell(block);
   } catch (...) {
-    give_up();
+    uploads_.pop_newest();
     throw;
   }
   const absl::Status claimed = !lit.ok()               ? lit.status()
                                : c.newest() != nullptr ? absl::OkStatus()
                                                        : claim(cell, source.elements);
   if (!claimed.ok()) {
-    give_up();
-    if (lit.ok()) {
-      lists_->release(lit->first_probe, index_.cells()[cell].probes);
-      cell_pools_->release(lit->place, recorded_ + 1);
-    }
+    uploads_.pop_newest();
+    if (lit.ok()) cell_pools_->release(lit->place, recorded_ + 1);
     return claimed;
   }
   uploads_.newest().to = cell_pools_->pools()[lit->place.pool].buffer.handle();
   uploads_.newest().offset = lit->place.offset;
-  if (uploads == 2) uploads_.newest(1).offset = 4ull * lit->first_probe;
   if (c.next) {
-    uploads_.cancel_all_but_newest(target, uploads);
-    bury(*c.next, cell);
+    uploads_.cancel_all_but_newest(target, 1);
+    bury(*c.next);
   }
   c.next = *lit;
   c.next->detail = detail;
   c.elements = std::move(elements);
+  ++lit_;
   touch();
   return absl::OkStatus();
 }
@@ -274,7 +262,7 @@ void VulkanAsset::unload_cell(uint32_t cell) {
   if (c.newest() == nullptr) return;
   uploads_.cancel({AssetIndex::Kind::kCell, cell});
   for (const auto* lit : {&c.now, &c.next, &c.base}) {
-    if (*lit) bury(**lit, cell);
+    if (*lit) bury(**lit);
   }
   for (const uint32_t e : c.elements) received_[e] = kNobody;
   c.elements = std::pmr::vector<uint32_t>(memory_);
@@ -289,10 +277,10 @@ void VulkanAsset::drop_cell_detail(uint32_t cell) {
   if (!c.base && !(c.now && c.now->detail.base)) return;
   if (c.next) {
     uploads_.cancel({AssetIndex::Kind::kCell, cell});
-    bury(*std::exchange(c.next, std::nullopt), cell);
+    bury(*std::exchange(c.next, std::nullopt));
   }
   if (!c.base) return;
-  bury(*c.now, cell);
+  bury(*c.now);
   c.now = std::exchange(c.base, std::nullopt);
   refresh_cell(cell, true);
 }
@@ -318,7 +306,7 @@ void VulkanAsset::uploaded(AssetIndex::Target target) {
     if (c.now && c.now->detail.base) {
       c.base = c.now;
     } else if (c.now) {
-      bury(*c.now, target.index);
+      bury(*c.now);
     }
     c.now = std::exchange(c.next, std::nullopt);
     refresh_cell(target.index, true);
@@ -354,7 +342,7 @@ void VulkanAsset::refresh_cell(uint32_t cell, bool anew) {
                 static_cast<uint32_t>(c.now->place.offset / gpu::kCellUnit),
                 c.now->jobs,
                 c.now->octets,
-                c.now->first_probe,
+                index_.cells()[cell].first_probe,
                 static_cast<uint32_t>(probes.size()),
                 ++generation_,
                 c.now->project_quads,
@@ -368,9 +356,7 @@ void VulkanAsset::refresh_cell(uint32_t cell, bool anew) {
   cell_table_.as<gpu::Cell>()[cell] = c.record;
   cell_table_.touch(cell * sizeof(gpu::Cell), (cell + 1) * sizeof(gpu::Cell));
   if (!live) return;
-  // Until it is so near that settle takes the last step.
-  const double left = 1 - static_cast<double>(settings_.options.fade);
-  if (left > 0) fade_frames_ = 1 + static_cast<uint32_t>(std::ceil(std::log(double{kArrived}) / std::log(left)));
+  if (settings_.options.fade < 1) fade_left_ = 1;
 }
 
 void VulkanAsset::set(SurfaceInput input, uint64_t first, std::span<const float> rgb) {
@@ -419,9 +405,7 @@ bool VulkanAsset::tables_pending() const {
 
 uint64_t VulkanAsset::pending_bytes() const {
   const std::lock_guard lock(mutex_);
-  uint64_t bytes = uploads_.pending_bytes();
-  for (const ShadowTable& t : inputs_) bytes += t.pending_bytes();
-  return bytes;
+  return uploads_.pending_bytes();
 }
 
 bool VulkanAsset::uploads_pending() const {
@@ -431,8 +415,9 @@ bool VulkanAsset::uploads_pending() const {
 
 void VulkanAsset::fill_counts(lightloom_counts* out) const {
   *out = counts_of(index_);
-  out->pending_bytes = pending_bytes();
   const std::lock_guard lock(mutex_);
+  out->pending_bytes = uploads_.pending_bytes();
+  for (const ShadowTable& t : inputs_) out->pending_bytes += t.pending_bytes();
   for (const bool resident : surfaces_) out->resident_surfaces += resident;
   for (const Probe& p : probes_) out->resident_probes += p.newest() != nullptr;
   for (const Cell& c : cells_) {

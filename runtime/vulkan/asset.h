@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "runtime/backend.h"
-#include "runtime/block_allocator.h"
 #include "runtime/cell_block.h"
 #include "runtime/include/lightloom_vulkan.h"
 #include "runtime/lightmap_map.h"
@@ -43,8 +42,8 @@ class VulkanAsset {
                                                              const AssetOptions& options,
                                                              std::pmr::memory_resource* memory);
 
-  /// No chunk is resident any more. REQUIRES: all recorded frames are finished, none follows.
-  void free_chunks();
+  /// Frees device memory, but for E. Then it is good for inherit() alone. REQUIRES: all recorded frames are finished.
+  void free_all_but_light();
   /// Takes over inputs and E. Before the first frame.
   void inherit(VulkanAsset* before, std::span<const AssetIndex::Kept> kept);
 
@@ -82,7 +81,6 @@ class VulkanAsset {
   struct LitCell {
     Detail detail;
     CellPools::Place place;
-    uint32_t first_probe = 0;  ///< of its probe list in cell_probes_
     uint32_t jobs = 0, octets = 0, project_quads = 0, receive_quads = 0;
   };
   template <class Lit>
@@ -103,7 +101,6 @@ class VulkanAsset {
     uint32_t frame;  ///< the first that no longer uses it
     std::optional<uint32_t> slot;
     CellPools::Place place;
-    uint32_t first_probe = 0, probes = 0;
   };
 
   VulkanAsset(Context* context, const Pipelines* pipelines, std::shared_ptr<const AssetIndex> index,
@@ -117,9 +114,10 @@ class VulkanAsset {
   void drop_relight_detail(uint32_t probe);
   void drop_cell_detail(uint32_t cell);
   absl::Status claim(uint32_t cell, const std::vector<uint32_t>& elements);
-  absl::StatusOr<LitCell> place_cell(uint32_t cell, const CellBlock& block);
+  absl::StatusOr<LitCell> place_cell(const CellBlock& block);
   void bury(const LitProbe& probe);
-  void bury(const LitCell& lit, uint32_t cell);
+  void bury(const LitCell& cell);
+  void make_room_for_graves();
   void uploaded(AssetIndex::Target target);
   void write_slot(uint32_t slot, uint32_t probe);
   /// Brings the device's record of the cell up to date; `anew`: what it computes from is another model than before.
@@ -171,8 +169,7 @@ class VulkanAsset {
   std::unique_ptr<RelightPools> relight_pools_;
 
   std::pmr::vector<uint32_t> coarse_rays_;
-  std::optional<BlockAllocator> lists_;  ///< ranges of cell_probes_
-  std::pmr::vector<bool> surfaces_;      ///< per object: resident
+  std::pmr::vector<bool> surfaces_;  ///< per object: resident
   std::pmr::vector<Probe> probes_;
   std::pmr::vector<Cell> cells_;
   std::pmr::vector<uint32_t> received_;  ///< per surface element: the cell that has its receiver, or kNobody
@@ -189,7 +186,8 @@ class VulkanAsset {
   bool image_stale_ = true;   ///< all of the image is to be written
   bool smooth_ = false;       ///< targets hold what E goes towards
   uint64_t chunk_bytes_ = 0;  ///< that the newest frame copies
-  uint32_t fade_frames_ = 0;  ///< that are left until a change of the model has arrived
+  uint32_t lit_ = 0;          ///< versions of cells and probes, each of which is buried once
+  double fade_left_ = 0;      ///< share of the last change of the model that is not shown yet; 0: none
   bool sky_changed_ = true;
   bool direct_overwritten_ = false;  ///< the direct pass wrote where the host's values were
   bool touched_ = true;              ///< something that the next frame must look at

@@ -47,9 +47,19 @@ absl::StatusOr<std::unique_ptr<VulkanAsset>> VulkanAsset::create(Context* contex
   return asset;
 }
 
-void VulkanAsset::free_chunks() {
+void VulkanAsset::free_all_but_light() {
+  sets_ = nullptr;
   cell_pools_ = nullptr;
   relight_pools_ = nullptr;
+  for (Buffer* b :
+       {&radiosity_, &points_, &normals_, &lambda_, &sh_[0], &sh_[1], &changed_, &dirty_, &slot_seen_, &stamps_,
+        &active_slots_, &cell_probes_, &cell_dirty_, &cell_seen_, &active_cells_, &control_, &inherited_}) {
+    *b = Buffer();
+  }
+  for (ShadowTable* t : {&inputs_[0], &inputs_[1], &inputs_[2], &cell_table_, &slot_table_, &map_table_}) {
+    t->free_device();
+  }
+  image_ = Image();
 }
 
 void VulkanAsset::inherit(VulkanAsset* before, std::span<const AssetIndex::Kept> kept) {
@@ -99,10 +109,7 @@ absl::Status VulkanAsset::create_arrays() {
   LL_RETURN_IF_ERROR(buffer(&dirty_, 4 * slots));
   LL_RETURN_IF_ERROR(buffer(&slot_seen_, 4 * slots));
   LL_RETURN_IF_ERROR(buffer(&stamps_, 4 * P));
-  // A cell that is replaced has two lists for a while.
-  const uint64_t lists = index_.cell_probes().size() * 5 / 4 + 4096;
-  lists_.emplace(lists, memory_);
-  LL_RETURN_IF_ERROR(buffer(&cell_probes_, 4 * lists));
+  LL_RETURN_IF_ERROR(buffer(&cell_probes_, 4 * index_.cell_probes().size()));
   LL_RETURN_IF_ERROR(buffer(&cell_dirty_, 4 * C));
   LL_RETURN_IF_ERROR(buffer(&cell_seen_, 4 * C));
   LL_RETURN_IF_ERROR(buffer(&active_cells_, C * sizeof(gpu::ActiveCell)));
@@ -121,6 +128,8 @@ absl::Status VulkanAsset::create_arrays() {
     LL_RETURN_IF_ERROR(buffer(&sh_[kind], table.size()));
     fill(sh_[kind], std::move(table));
   }
+  const auto* lists = reinterpret_cast<const uint8_t*>(index_.cell_probes().data());
+  fill(cell_probes_, std::pmr::vector<uint8_t>(lists, lists + 4 * index_.cell_probes().size(), memory_));
 
   if (options_.image_format != VK_FORMAT_UNDEFINED && index_.width() > 0 && index_.height() > 0) {
     const uint64_t texels = uint64_t{kImageLayers} * index_.width() * index_.height();

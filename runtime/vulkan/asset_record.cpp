@@ -74,7 +74,6 @@ void VulkanAsset::free_graves(uint32_t frame) {
       relight_pools_->release(*g->slot, frame);
     } else {
       cell_pools_->release(g->place, frame);
-      lists_->release(g->first_probe, g->probes);
     }
   }
   graves_.erase(graves_.begin(), g);
@@ -200,12 +199,16 @@ absl::Status VulkanAsset::record_uploads(VkCommandBuffer commands, uint32_t fram
   slot_table_.record(commands, &staging, staging.room());
   cell_table_.record(commands, &staging, staging.room());
   map_table_.record(commands, &staging, staging.room());
-  if (!smooth_ && options_.smoothing && (settings_.options.smoothing < 1 || fade_frames_ > 0)) {
+  if (!smooth_ && options_.smoothing && (settings_.options.smoothing < 1 || fade_left_ > 0)) {
     barrier_between(*context_, commands);
     const uint64_t bytes = irradiance_.size() / 2;
     const VkBufferCopy copy{0, bytes, bytes};
     vk.CmdCopyBuffer(commands, irradiance_.handle(), irradiance_.handle(), 1, &copy);
     smooth_ = true;
+  }
+  // What cells and slots have left may still be read by frames whose tables say so.
+  if (cell_table_.pending_bytes() + slot_table_.pending_bytes() > 0) {
+    for (Grave& g : graves_) g.frame = std::max(g.frame, frame + context_->frames + 1);
   }
   return staging.flush();
 }
@@ -342,7 +345,7 @@ void VulkanAsset::record_cells(VkCommandBuffer commands, uint32_t frame, FrameMe
 /// How far E goes to its target in this frame.
 float VulkanAsset::settle_share() const {
   if (settings_.options.smoothing < 1) return settings_.options.smoothing;
-  return fade_frames_ > 1 ? settings_.options.fade : 1;
+  return fade_left_ > double{kArrived} ? settings_.options.fade : 1;
 }
 
 void VulkanAsset::record_settle(VkCommandBuffer commands, float share) {
@@ -353,8 +356,8 @@ void VulkanAsset::record_settle(VkCommandBuffer commands, float share) {
     barrier_between(*context_, commands);
   }
   image_stale_ = true;
-  // Cells that wait for their turn have not begun to fade.
-  if (fade_frames_ > 0 && (fade_frames_ == 1 || last_.waiting_cells == 0)) --fade_frames_;
+  // Cells that wait for their turn, or for a probe's, have not begun to fade.
+  if (last_.waiting_cells == 0 && last_.waiting_probes == 0) fade_left_ *= 1 - static_cast<double>(share);
   // With a share of 1 it has arrived.
   if (share >= 1) smooth_ = false;
 }

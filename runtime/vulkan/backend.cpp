@@ -72,7 +72,7 @@ absl::Status VulkanBackend::start(std::shared_ptr<const AssetIndex> index, std::
   const std::unique_ptr<VulkanAsset> before = std::move(asset_);
   forget_frames();
   // Both may not fit.
-  if (before != nullptr) before->free_chunks();
+  if (before != nullptr) before->free_all_but_light();
   LL_ASSIGN_OR_RETURN(auto asset,
                       VulkanAsset::create(&context_, pipelines_.get(), std::move(index), asset_options_, memory_));
   asset->set_options(options_);

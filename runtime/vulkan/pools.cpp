@@ -7,6 +7,9 @@
 namespace lightloom {
 namespace {
 
+/// Unless the whole asset is smaller, or the caller's pages are.
+constexpr uint64_t kLeastPage = 1 << 20;
+
 uint64_t rounded_up(uint64_t n, uint64_t to) { return (n + to - 1) / to * to; }
 
 }  // namespace
@@ -41,10 +44,8 @@ absl::StatusOr<CellPools::Place> CellPools::allocate(uint64_t bytes) {
 }
 
 absl::Status CellPools::create(Pool* pool, uint64_t least) {
-  // As large as the rest of the asset needs, a page, and the budget allow.
-  const uint64_t rest = total_bytes_ > pool_bytes_ ? total_bytes_ - pool_bytes_ : 0;
-  // Memory that waits for frames in flight can make it need more.
-  uint64_t bytes = std::min(std::max(rest, total_bytes_ / 8), context_->page_bytes);
+  // An eighth of what the whole asset needs: who keeps a part of it resident shall not pay for all.
+  uint64_t bytes = std::min(std::max(total_bytes_ / 8, kLeastPage), context_->page_bytes);
   if (context_->budget != 0) bytes = std::min(bytes, context_->budget - std::min(context_->budget, context_->bytes));
   bytes = std::max(bytes, least) / gpu::kCellUnit * gpu::kCellUnit;
 
@@ -55,7 +56,6 @@ absl::Status CellPools::create(Pool* pool, uint64_t least) {
   BlockAllocator blocks(bytes, memory_);
   LL_ASSIGN_OR_RETURN(pool->buffer, Buffer::create(context_, bytes, BufferUse::kDevice));
   pool->blocks.emplace(std::move(blocks));
-  pool_bytes_ += bytes;
 
   const VkDescriptorBufferInfo data = pool->buffer.whole();
   const VkDescriptorBufferInfo project[] = {
@@ -81,7 +81,6 @@ void CellPools::release(const Place& place, uint32_t frame) {
 void CellPools::free_retired(uint32_t frame) {
   for (Pool& pool : pools_) {
     if (pool.retired == 0 || pool.retired > frame) continue;
-    pool_bytes_ -= pool.buffer.size();
     pool.buffer = Buffer();
     pool.retired = 0;
   }
@@ -94,7 +93,7 @@ RelightPools::RelightPools(Context* context, std::span<const RelightRays> kinds,
   const uint32_t slots = static_cast<uint32_t>(rounded_up(uint64_t{probes} + probes / 8 + 1, gpu::kSlotGranule));
   const uint64_t fit = context->page_bytes / slot_bytes(kinds[0]) / gpu::kSlotGranule * gpu::kSlotGranule;
   pool_slots_ = static_cast<uint32_t>(
-      std::clamp<uint64_t>(fit, gpu::kSlotGranule, rounded_up(std::max(1u, probes), gpu::kSlotGranule)));
+      std::clamp<uint64_t>(fit, gpu::kSlotGranule, rounded_up(std::max(1u, probes / 8), gpu::kSlotGranule)));
   pools_per_kind_ = (slots + pool_slots_ - 1) / pool_slots_;
   if (!check().ok()) return;
   for (uint32_t kind = 0; kind < kinds.size(); ++kind) {

@@ -50,7 +50,7 @@ class CellPools {
   Context* context_;
   DescriptorSets* sets_;
   PoolBindings bindings_;
-  uint64_t total_bytes_, pool_bytes_ = 0;
+  uint64_t total_bytes_;
   std::pmr::memory_resource* memory_;
   std::array<Pool, gpu::kMaxPools> pools_;
 };

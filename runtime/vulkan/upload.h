@@ -76,6 +76,7 @@ class ShadowTable {
   /// Sets the device's copy to what the table was created with.
   void clear(VkCommandBuffer commands, const Context& context) const;
   const Buffer& device() const { return device_; }
+  void free_device() { device_ = Buffer(); }
   template <class T>
   T* as() {
     return reinterpret_cast<T*>(host_.data());

@@ -116,11 +116,19 @@ class FakeVulkanTest : public ::testing::Test {
     lightloom_result result = create(&runtime);
     EXPECT_EQ(runtime != nullptr, result == LIGHTLOOM_OK);
     if (result == LIGHTLOOM_OK) result = load(runtime);
-    for (int frame = 0; frame < 5 && result == LIGHTLOOM_OK; ++frame) {
+    for (int frame = 0; frame < 6 && result == LIGHTLOOM_OK; ++frame) {
       if (frame == 2) {
         for (const CellEntry& c : asset_.manifest.cells) lightloom_unload_chunk(runtime, c.chunk.digest.bytes.data());
       }
       if (frame == 3) result = load_parts(runtime);
+      if (frame == 4 && result == LIGHTLOOM_OK) {
+        const auto manifest = encode_manifest(asset_.manifest);
+        result = lightloom_reload_manifest(runtime, manifest.data(), manifest.size());
+        // Whatever became of it, asking is safe.
+        lightloom_counts counts{};
+        counts.struct_size = sizeof counts;
+        lightloom_get_counts(runtime, &counts);
+      }
       if (result != LIGHTLOOM_OK) break;
       result = record(runtime);
     }

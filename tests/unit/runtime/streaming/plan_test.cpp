@@ -61,15 +61,16 @@ TEST_F(PlanTest, CostsAreTheBlocksBytes) {
   }
 }
 
-TEST_F(PlanTest, NoBudgetIsExceededAndMoreOfItHoldsMore) {
-  uint64_t last = 0;
-  const uint64_t all = bytes_of(choose(UINT64_MAX));
-  const uint64_t bases = bytes_of(choose(0));
+TEST_F(PlanTest, BudgetsAreKeptAndUsed) {
+  const StreamCosts costs(index());
+  uint64_t largest = 0;
+  for (const StreamStep& s : rank_steps(index(), costs, importance_, now_)) largest = std::max(largest, s.bytes);
+  const uint64_t all = bytes_of(choose(UINT64_MAX)), bases = bytes_of(choose(0));
   for (uint64_t budget = bases; budget < all; budget += (all - bases) / 50) {
     const uint64_t bytes = bytes_of(choose(budget));
     EXPECT_LE(bytes, budget);
-    EXPECT_GE(bytes, last);
-    last = bytes;
+    // What is left over is too little for some step.
+    EXPECT_GT(bytes + largest, budget);
   }
   const StreamLevels everything = choose(UINT64_MAX);
   for (const CellLevel level : everything.cells) EXPECT_EQ(level, CellLevel::kAll);
@@ -82,6 +83,21 @@ TEST_F(PlanTest, WhatIsSeenComesFirst) {
   const StreamLevels levels = choose(bases + costs.cell(7, CellLevel::kAll));
   EXPECT_EQ(levels.cells[7], CellLevel::kAll);
   for (uint32_t c = 0; c < levels.cells.size(); ++c) EXPECT_NE(levels.cells[c], CellLevel::kNone);
+}
+
+TEST_F(PlanTest, AStepThatDoesNotFitKeepsNoOtherOut) {
+  const StreamCosts costs(index());
+  uint32_t large = 0;
+  for (uint32_t c = 1; c < index().cells().size(); ++c) {
+    if (costs.cell(c, CellLevel::kAll) > costs.cell(large, CellLevel::kAll)) large = c;
+  }
+  importance_[large] = 1000;  // pinned
+  const uint64_t step = costs.cell(large, CellLevel::kAll) - costs.cell(large, CellLevel::kSome);
+  const StreamLevels levels = choose(bytes_of(choose(0)) + step / 2);
+  EXPECT_NE(levels.cells[large], CellLevel::kAll);
+  size_t more = 0;
+  for (const CellLevel level : levels.cells) more += level > CellLevel::kBase;
+  EXPECT_GT(more, 0u);
 }
 
 TEST_F(PlanTest, StepsOfACellAreInOrder) {

@@ -221,6 +221,57 @@ TEST_P(StreamTest, DestroyedInTheMiddle) {
   }
 }
 
+/// Its own pages, and more probe lists than would fit some fixed room.
+TEST_P(StreamTest, AHardBudgetThatIsTooSmallIsLivedWith) {
+  const uint64_t empty = runtime_.counts().gpu_bytes;
+  uint64_t chunks = 0;
+  for (const CellEntry& c : asset_.manifest.cells) chunks += c.chunk.size;
+  lightloom_create_info info{};
+  info.struct_size = sizeof info;
+  info.flags = GetParam() | LIGHTLOOM_CREATE_SMOOTHING;
+  info.byte_budget = empty + chunks / 2;
+  info.page_bytes = 32 << 10;
+  lightloom_runtime* small = nullptr;
+  ASSERT_EQ(lightloom_create(&info, &small), LIGHTLOOM_OK);
+  ASSERT_EQ(lightloom_load_manifest(small, manifest_.data(), manifest_.size()), LIGHTLOOM_OK);
+  lightloom_stream_info stream_info{};
+  stream_info.struct_size = sizeof stream_info;
+  stream_info.flags = LIGHTLOOM_STREAM_NO_THREAD;
+  stream_info.read_chunk = Reader::read;
+  stream_info.read_user = &reader_;
+  ASSERT_EQ(lightloom_stream_create(small, &stream_info, &stream_), LIGHTLOOM_OK);
+  for (int frame = 0; frame < 200; ++frame) {
+    see({0, 0, 0});
+    ASSERT_EQ(lightloom_stream_work(stream_, UINT64_MAX, nullptr), LIGHTLOOM_OK);
+    ASSERT_EQ(lightloom_update(small, 1), LIGHTLOOM_OK);
+    lightloom_counts counts{};
+    counts.struct_size = sizeof counts;
+    ASSERT_EQ(lightloom_get_counts(small, &counts), LIGHTLOOM_OK);
+    ASSERT_LE(counts.gpu_bytes, info.byte_budget);
+  }
+  EXPECT_EQ(state().base_cells + state().some_cells + state().all_cells, asset_.manifest.cells.size());
+  EXPECT_GT(state().some_cells + state().all_cells + state().all_probes, 0u);
+  lightloom_stream_destroy(stream_);
+  stream_ = nullptr;
+  lightloom_destroy(small);
+}
+
+TEST_P(StreamTest, ASecondStreamNeedsAnEmptyRuntime) {
+  create(LIGHTLOOM_STREAM_NO_THREAD);
+  finish();
+  lightloom_stream_destroy(stream_);
+  stream_ = nullptr;
+  lightloom_stream_info info{};
+  info.struct_size = sizeof info;
+  info.read_chunk = Reader::read;
+  info.read_user = &reader_;
+  EXPECT_EQ(lightloom_stream_create(runtime_.get(), &info, &stream_), LIGHTLOOM_ERROR_INVALID_ARGUMENT);
+  ASSERT_EQ(lightloom_reload_manifest(runtime_.get(), manifest_.data(), manifest_.size()), LIGHTLOOM_OK);
+  create(LIGHTLOOM_STREAM_NO_THREAD);
+  finish();
+  EXPECT_LT(p999_error(settled(), whole()), 1e-4);
+}
+
 TEST_P(StreamTest, BadArguments) {
   lightloom_stream_info info{};
   EXPECT_EQ(lightloom_stream_create(runtime_.get(), &info, &stream_), LIGHTLOOM_ERROR_INVALID_ARGUMENT);
