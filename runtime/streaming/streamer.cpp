@@ -88,6 +88,7 @@ bool Streamer::looks_again() const { return unseen_ >= kSights || (unseen_ > 0 &
 void Streamer::look() {
   StreamView view;
   std::vector<Aabb> pins;
+  float forget = 1;
   {
     const std::lock_guard lock(mutex_);
     const bool again = looks_again();
@@ -97,12 +98,12 @@ void Streamer::look() {
     const bool news = again || !(view_ == seen_) || pins_are_new_ || views_ - looked_view_ >= kStill;
     seen_view_ = views_;
     if (!news) return;
-    looked_view_ = views_;
+    forget = std::pow(kForget, static_cast<float>(views_ - std::exchange(looked_view_, views_)));
     pins_are_new_ = false;
     seen_ = view = view_;
     pins = pins_;
   }
-  for (float& i : importance_) i *= kForget;
+  for (float& i : importance_) i *= forget;
   if (squeezed_until_ && seen_view_ >= *squeezed_until_) {
     squeezed_until_.reset();
     budget_ = options_.budget;

