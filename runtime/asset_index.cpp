@@ -157,10 +157,15 @@ std::optional<AssetIndex::Target> AssetIndex::find(const Digest& digest) const {
 std::vector<AssetIndex::Kept> AssetIndex::kept_from(const AssetIndex& before) const {
   std::vector<Kept> kept;
   for (const Object& o : objects_) {
-    if (o.surface.size == 0) continue;
-    const std::optional<Target> same = before.find(o.surface.digest);
-    if (!same || same->kind != Kind::kSurface) continue;
-    kept.push_back({before.objects()[same->index].first_element, o.first_element, o.elements});
+    const auto it = std::lower_bound(before.by_id_.begin(), before.by_id_.end(), o.id,
+                                     [&before](uint32_t a, const Digest& id) { return before.objects_[a].id < id; });
+    if (it == before.by_id_.end() || before.objects_[*it].id != o.id) continue;
+    const Object& old = before.objects_[*it];
+    if (old.width != o.width || old.height != o.height) continue;
+    // One half from the front, the other from the back: what has changed lies somewhere in between.
+    const uint32_t count = std::min(old.elements, o.elements), front = count / 2, back = count - front;
+    kept.push_back({old.first_element, o.first_element, front});
+    kept.push_back({old.first_element + old.elements - back, o.first_element + o.elements - back, back});
   }
   return kept;
 }

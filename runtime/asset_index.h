@@ -79,7 +79,8 @@ class AssetIndex {
   struct Kept {
     uint32_t from = 0, to = 0, count = 0;
   };
-  /// Of `before` those whose object has the same surface here.
+  /// Of `before` those whose object is here too. Where a few of an object's texels are others (something has moved onto
+  /// them), the rest are taken in their order: neighbours' light, instead of none.
   std::vector<Kept> kept_from(const AssetIndex& before) const;
 
   /// Decoded and compared with the manifest. DataLoss if anything is wrong; Unimplemented for newer versions.

@@ -39,7 +39,7 @@ class Backend {
 
   /// Replaces the asset; after a failure there is none.
   absl::Status load_manifest(std::span<const uint8_t> manifest);
-  /// As load_manifest, but surface elements of objects with the same surface as before keep their inputs and E. A
+  /// As load_manifest, but surface elements of objects that stay keep their inputs and E (AssetIndex::kept_from). A
   /// manifest that is not valid changes nothing.
   absl::Status reload_manifest(std::span<const uint8_t> manifest);
   virtual void unload() = 0;

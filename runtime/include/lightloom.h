@@ -120,8 +120,9 @@ LIGHTLOOM_API void lightloom_destroy(lightloom_runtime* runtime);
 LIGHTLOOM_API lightloom_result lightloom_load_manifest(lightloom_runtime* runtime, const void* manifest,
                                                        uint64_t bytes);
 
-/* The level was baked anew: as lightloom_load_manifest, but elements of objects whose surface chunk is the same as before
- * keep direct, albedo, emission and E, under their new numbers; the sky stays. So the level goes on as it was lit until
+/* The level was baked anew: as lightloom_load_manifest, but elements of objects that stay keep direct, albedo, emission
+ * and E, under their new numbers; the sky stays. Of an object some of whose texels are others now, elements keep those of
+ * about the same place: set albedo and emission of all. So the level goes on as it was lit until
  * its chunks are there, and those of new objects start dark. Streams must be destroyed before. A manifest that is
  * not valid changes nothing; on another failure no asset is loaded. */
 LIGHTLOOM_API lightloom_result lightloom_reload_manifest(lightloom_runtime* runtime, const void* manifest,

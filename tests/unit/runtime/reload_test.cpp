@@ -115,6 +115,33 @@ TEST_P(ReloadTest, TwiceInARowAndAtOnceAfterAReset) {
   EXPECT_EQ(runtime.irradiance(), std::vector<Vec3>(from_.size()));
 }
 
+/// Something has moved onto one of its texels.
+TEST_P(ReloadTest, AnObjectWithOtherTexelsIsNotBlack) {
+  TestRuntime runtime(GetParam());
+  ASSERT_EQ(runtime.load(before_), LIGHTLOOM_OK);
+  runtime.light(light_);
+  settle(runtime);
+  const std::vector<Vec3> lit = runtime.irradiance();
+  SyntheticAsset fewer = testing::empty_asset(4, 200);
+  const ObjectEntry& old = before_.manifest.objects[0];
+  SurfaceChunk surface = *decode_surface(before_.chunks.at(old.surface.digest));
+  surface.keys.pop_back();
+  surface.positions.pop_back();
+  surface.normals.pop_back();
+  surface.areas.pop_back();
+  fewer.manifest.objects.push_back(old);
+  fewer.manifest.objects[0].surface = fewer.put(encode_surface(surface));
+  fewer.manifest.width = before_.manifest.width;
+  fewer.manifest.height = before_.manifest.height;
+  ASSERT_EQ(reload(runtime, encode_manifest(fewer.manifest)), LIGHTLOOM_OK) << joined(runtime.received().errors);
+  ASSERT_EQ(lightloom_update(runtime.get(), 1), LIGHTLOOM_OK);
+  // The first half in its place; of the second, the last is gone.
+  std::vector<Vec3> expected(surface.keys.size());
+  const size_t front = expected.size() / 2;
+  for (size_t i = 0; i < expected.size(); ++i) expected[i] = lit[i < front ? i : i + 1];
+  EXPECT_EQ(runtime.irradiance(), expected);
+}
+
 TEST_P(ReloadTest, ABadManifestChangesNothing) {
   TestRuntime runtime(GetParam());
   std::vector<uint8_t> manifest = encode_manifest(after_.manifest);
