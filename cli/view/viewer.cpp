@@ -250,8 +250,8 @@ absl::Status Viewer::show_marks() {
       LL_ASSIGN_OR_RETURN(owners_,
                           find_owners(level_->files().loom, level_->manifest(), level_->scene(), level_->elements()));
     }
-    LL_RETURN_IF_ERROR(screen_->set_overlays(overlay_marks(state_.overlays, level_->manifest(), level_->elements(),
-                                                           owners_, level_->runtime().cell_levels())));
+    LL_RETURN_IF_ERROR(screen_->set_overlays(
+        overlay_marks(state_.overlays, level_->manifest(), level_->elements(), owners_, cell_levels_)));
     marks_are_old_ = false;
   }
   renderer::Marks selection;

@@ -27,11 +27,11 @@ constexpr uint64_t kStill = 16;
 /// Bases that are loaded between two looks.
 constexpr uint32_t kSights = 64;
 
-/// And not of the memory, or of another chunk that must come first.
-bool is_of_the_chunk(lightloom_result result) {
-  return result != LIGHTLOOM_ERROR_NOT_READY && result != LIGHTLOOM_ERROR_OVER_BUDGET &&
-         result != LIGHTLOOM_ERROR_OUT_OF_MEMORY;
+bool is_full(lightloom_result result) {
+  return result == LIGHTLOOM_ERROR_OVER_BUDGET || result == LIGHTLOOM_ERROR_OUT_OF_MEMORY;
 }
+/// And not the lack of memory, or of another chunk that must come first.
+bool is_the_chunks_fault(lightloom_result result) { return result != LIGHTLOOM_ERROR_NOT_READY && !is_full(result); }
 
 constexpr uint8_t kBase = 1;
 static_assert(static_cast<uint8_t>(CellLevel::kBase) == kBase && static_cast<uint8_t>(ProbeLevel::kBase) == kBase);
@@ -53,7 +53,6 @@ Streamer::Streamer(Backend* backend, ReadChunk read, StreamOptions options)
   std::iota(base_order_.begin(), base_order_.end(), 0);
   now_.cells.assign(index_.cells().size(), CellLevel::kNone);
   now_.probes.assign(index_.probes().size(), ProbeLevel::kNone);
-  state_.budget = options_.budget;
 }
 
 void Streamer::set_view(const StreamView& view) {
@@ -158,8 +157,7 @@ void Streamer::set_level(const AssetIndex::Target& target, uint8_t level) {
   state_.bytes += bytes_of(target, level);
   state_.bytes -= bytes_of(target, level_of(target));
   const auto count = [&](uint8_t at) -> uint32_t* {
-    if (at == 0) return nullptr;
-    if (target.kind == AssetIndex::Kind::kSurface) return &state_.surfaces;
+    if (at == 0 || target.kind == AssetIndex::Kind::kSurface) return nullptr;
     if (target.kind == AssetIndex::Kind::kRelight) return at == kBase ? &state_.base_probes : &state_.all_probes;
     return at == kBase                                    ? &state_.base_cells
            : at == static_cast<uint8_t>(CellLevel::kSome) ? &state_.some_cells
@@ -289,11 +287,10 @@ void Streamer::note_failure(const AssetIndex::Target& target, Failure failure) {
 
 Streamer::Progress Streamer::no_room(const AssetIndex::Target& target, const absl::Status& status) {
   const lightloom_result result = result_of(status);
-  const bool full = result == LIGHTLOOM_ERROR_OVER_BUDGET || result == LIGHTLOOM_ERROR_OUT_OF_MEMORY;
-  if (!full && result != LIGHTLOOM_ERROR_NOT_READY) return put_off(target, status);
+  if (is_the_chunks_fault(result)) return put_off(target, status);
   // Uploads that are to come free what they replace, and what was dropped is free some frames later.
   if (backend_->pending_bytes() > 0) return Progress::kWait;
-  if (full && failures_[number_of(target)].times > 0) {
+  if (is_full(result) && failures_[number_of(target)].times > 0) {
     // There was time enough: this is all there is, for now.
     budget_ = state_.bytes;
     squeezed_until_ = seen_view_ + kSqueezed;
@@ -305,7 +302,7 @@ Streamer::Progress Streamer::no_room(const AssetIndex::Target& target, const abs
 /// Others go on meanwhile.
 Streamer::Progress Streamer::put_off(const AssetIndex::Target& target, const absl::Status& status) {
   const uint32_t times = failures_[number_of(target)].times + 1;
-  if (times == 1 && options_.report && is_of_the_chunk(result_of(status))) options_.report(status);
+  if (times == 1 && options_.report && is_the_chunks_fault(result_of(status))) options_.report(status);
   note_failure(target, {times, seen_view_ + (uint64_t{16} << std::min(times, 10u))});
   return Progress::kStep;
 }

@@ -31,11 +31,10 @@ struct StreamOptions {
 };
 
 struct StreamState {
-  uint32_t surfaces = 0;                                   ///< resident
   uint32_t base_cells = 0, some_cells = 0, all_cells = 0;  ///< at exactly that level
   uint32_t base_probes = 0, all_probes = 0;
   uint32_t failing = 0;  ///< chunks that could not be had the last time
-  uint64_t bytes = 0, budget = 0;
+  uint64_t bytes = 0;
   uint64_t read_bytes = 0, read_chunks = 0, drops = 0;  ///< so far
   bool done = false;  ///< all that this view needs and the budget holds is there, or was put off
 };

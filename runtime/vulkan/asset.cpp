@@ -32,6 +32,33 @@ absl::Status VulkanAsset::Resident<Lit>::check(const Detail& detail) const {
   return absl::OkStatus();
 }
 
+template <class Lit>
+void VulkanAsset::bury_all(Resident<Lit>* resident) {
+  for (std::optional<Lit>* lit : {&resident->now, &resident->next, &resident->base}) {
+    if (*lit) bury(*std::exchange(*lit, std::nullopt));
+  }
+}
+
+/// What is on its way lights from now on; a base stays beneath it.
+template <class Lit>
+void VulkanAsset::take_next(Resident<Lit>* resident) {
+  if (resident->now && resident->now->detail.base) {
+    resident->base = resident->now;
+  } else if (resident->now) {
+    bury(*resident->now);
+  }
+  resident->now = std::exchange(resident->next, std::nullopt);
+}
+
+/// Gives up what is on its way to lie above a base.
+template <class Lit>
+void VulkanAsset::drop_next(const AssetIndex::Target& target, Resident<Lit>* resident) {
+  const bool has_base = resident->base || (resident->now && resident->now->detail.base);
+  if (!has_base || !resident->next) return;
+  uploads_.cancel(target);
+  bury(*std::exchange(resident->next, std::nullopt));
+}
+
 bool VulkanAsset::resident(const AssetIndex::Target& target, const Detail& detail) const {
   const std::lock_guard lock(mutex_);
   switch (target.kind) {
@@ -171,20 +198,13 @@ void VulkanAsset::unload_relight(uint32_t probe) {
   if (p.newest() == nullptr) return;
   uploads_.cancel({AssetIndex::Kind::kRelight, probe});
   if (p.now) write_slot(p.now->slot, gpu::kNoProbe);
-  for (const auto* lit : {&p.now, &p.next, &p.base}) {
-    if (*lit) bury(**lit);
-  }
-  p = {};
+  bury_all(&p);
   for (const uint32_t c : index_.cells_of(probe)) refresh_cell(c, false);
 }
 
 void VulkanAsset::drop_relight_detail(uint32_t probe) {
   Probe& p = probes_[probe];
-  if (!p.base && !(p.now && p.now->detail.base)) return;
-  if (p.next) {
-    uploads_.cancel({AssetIndex::Kind::kRelight, probe});
-    bury(*std::exchange(p.next, std::nullopt));
-  }
+  drop_next({AssetIndex::Kind::kRelight, probe}, &p);
   if (!p.base) return;
   write_slot(p.now->slot, gpu::kNoProbe);
   bury(*p.now);
@@ -237,7 +257,7 @@ absl::Status VulkanAsset::load_cell(uint32_t cell, const SourceCell& source, con
   }
   const absl::Status claimed = !lit.ok()               ? lit.status()
                                : c.newest() != nullptr ? absl::OkStatus()
-                                                       : claim(cell, source.elements);
+                                                       : mark_received(cell, source.elements);
   if (!claimed.ok()) {
     uploads_.pop_newest();
     if (lit.ok()) cell_pools_->release(lit->place, recorded_ + 1);
@@ -261,24 +281,15 @@ void VulkanAsset::unload_cell(uint32_t cell) {
   Cell& c = cells_[cell];
   if (c.newest() == nullptr) return;
   uploads_.cancel({AssetIndex::Kind::kCell, cell});
-  for (const auto* lit : {&c.now, &c.next, &c.base}) {
-    if (*lit) bury(**lit);
-  }
-  for (const uint32_t e : c.elements) received_[e] = kNobody;
+  bury_all(&c);
+  for (const uint32_t e : c.elements) received_[e] = false;
   c.elements = std::pmr::vector<uint32_t>(memory_);
-  c.now.reset();
-  c.next.reset();
-  c.base.reset();
   refresh_cell(cell, false);
 }
 
 void VulkanAsset::drop_cell_detail(uint32_t cell) {
   Cell& c = cells_[cell];
-  if (!c.base && !(c.now && c.now->detail.base)) return;
-  if (c.next) {
-    uploads_.cancel({AssetIndex::Kind::kCell, cell});
-    bury(*std::exchange(c.next, std::nullopt));
-  }
+  drop_next({AssetIndex::Kind::kCell, cell}, &c);
   if (!c.base) return;
   bury(*c.now);
   c.now = std::exchange(c.base, std::nullopt);
@@ -286,13 +297,13 @@ void VulkanAsset::drop_cell_detail(uint32_t cell) {
 }
 
 /// No two receivers may share an E.
-absl::Status VulkanAsset::claim(uint32_t cell, const std::vector<uint32_t>& elements) {
+absl::Status VulkanAsset::mark_received(uint32_t cell, const std::vector<uint32_t>& elements) {
   for (size_t i = 0; i < elements.size(); ++i) {
-    if (received_[elements[i]] == kNobody) {
-      received_[elements[i]] = cell;
+    if (!received_[elements[i]]) {
+      received_[elements[i]] = true;
       continue;
     }
-    for (size_t marked = 0; marked < i; ++marked) received_[elements[marked]] = kNobody;
+    for (size_t marked = 0; marked < i; ++marked) received_[elements[marked]] = false;
     return absl::DataLossError("cell " + std::to_string(cell) +
                                " is corrupt: a receiver occurs twice; bake again or fetch it again");
   }
@@ -302,24 +313,13 @@ absl::Status VulkanAsset::claim(uint32_t cell, const std::vector<uint32_t>& elem
 /// The frame that is being recorded has all of it.
 void VulkanAsset::uploaded(AssetIndex::Target target) {
   if (target.kind == AssetIndex::Kind::kCell) {
-    Cell& c = cells_[target.index];
-    if (c.now && c.now->detail.base) {
-      c.base = c.now;
-    } else if (c.now) {
-      bury(*c.now);
-    }
-    c.now = std::exchange(c.next, std::nullopt);
+    take_next(&cells_[target.index]);
     refresh_cell(target.index, true);
   } else if (target.kind == AssetIndex::Kind::kRelight) {
     Probe& p = probes_[target.index];
     const bool replaces = p.now.has_value();
     if (replaces) write_slot(p.now->slot, gpu::kNoProbe);
-    if (replaces && p.now->detail.base) {
-      p.base = p.now;
-    } else if (replaces) {
-      bury(*p.now);
-    }
-    p.now = std::exchange(p.next, std::nullopt);
+    take_next(&p);
     write_slot(p.now->slot, target.index);
     for (const uint32_t c : index_.cells_of(target.index)) refresh_cell(c, replaces);
   }

@@ -34,9 +34,6 @@ enum class FrameKind { kWhole, kUploads };
 /// Threads: residency and set() from any, record() from one.
 class VulkanAsset {
  public:
-  /// Instead of a cell.
-  static constexpr uint32_t kNobody = UINT32_MAX;
-
   static absl::StatusOr<std::unique_ptr<VulkanAsset>> create(Context* context, const Pipelines* pipelines,
                                                              std::shared_ptr<const AssetIndex> index,
                                                              const AssetOptions& options,
@@ -113,11 +110,17 @@ class VulkanAsset {
   void unload_cell(uint32_t cell);
   void drop_relight_detail(uint32_t probe);
   void drop_cell_detail(uint32_t cell);
-  absl::Status claim(uint32_t cell, const std::vector<uint32_t>& elements);
+  absl::Status mark_received(uint32_t cell, const std::vector<uint32_t>& elements);
   absl::StatusOr<LitCell> place_cell(const CellBlock& block);
   void bury(const LitProbe& probe);
   void bury(const LitCell& cell);
   void make_room_for_graves();
+  template <class Lit>
+  void bury_all(Resident<Lit>* resident);
+  template <class Lit>
+  void take_next(Resident<Lit>* resident);
+  template <class Lit>
+  void drop_next(const AssetIndex::Target& target, Resident<Lit>* resident);
   void uploaded(AssetIndex::Target target);
   void write_slot(uint32_t slot, uint32_t probe);
   /// Brings the device's record of the cell up to date; `anew`: what it computes from is another model than before.
@@ -172,7 +175,7 @@ class VulkanAsset {
   std::pmr::vector<bool> surfaces_;  ///< per object: resident
   std::pmr::vector<Probe> probes_;
   std::pmr::vector<Cell> cells_;
-  std::pmr::vector<uint32_t> received_;  ///< per surface element: the cell that has its receiver, or kNobody
+  std::pmr::vector<bool> received_;  ///< per surface element
   std::unique_ptr<LightmapMap> map_;
   uint32_t map_layers_ = 1;
   UploadQueue uploads_;

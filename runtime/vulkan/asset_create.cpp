@@ -31,7 +31,7 @@ VulkanAsset::VulkanAsset(Context* context, const Pipelines* pipelines, std::shar
       surfaces_(index_.objects().size(), false, memory),
       probes_(index_.probes().size(), memory),
       cells_(memory),
-      received_(index_.surface_elements(), kNobody, memory),
+      received_(index_.surface_elements(), false, memory),
       uploads_(memory),
       graves_(memory) {
   settings_.options.smoothing = settings_.options.fade = 1;

@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <numeric>
 
+#include "cli/loom_runtime.h"
 #include "core/scene/builtin.h"
 #include "tests/support/baked_level.h"
 #include "tests/unit/runtime/test_engine.h"
@@ -24,15 +25,6 @@ struct Gallery {
   uint64_t asset_bytes = 0;      ///< of all chunks
   std::vector<Vec3> irradiance;  ///< with all of it resident
 
-  static int read_chunk(void* user, const uint8_t digest[32], uint64_t size, void* out) {
-    ChunkRef ref;
-    std::copy(digest, digest + 32, ref.digest.bytes.begin());
-    ref.size = size;
-    const auto bytes = static_cast<const ChunkStore*>(user)->get(ref);
-    if (!bytes.ok()) return 1;
-    std::copy(bytes->begin(), bytes->end(), static_cast<uint8_t*>(out));
-    return 0;
-  }
   SurfaceLight light() const { return {inputs.direct, inputs.albedo, inputs.emission, level->scene->environment}; }
 };
 
@@ -52,13 +44,13 @@ const Gallery& gallery() {
 /// A stream of the gallery that works when it is told to.
 class Stream {
  public:
-  Stream(lightloom_runtime* runtime, double share) : store_(chunk_store(gallery().level->loom())) {
+  Stream(lightloom_runtime* runtime, double share) : reader_(gallery().level->loom()) {
     budget_ = static_cast<uint64_t>(share * static_cast<double>(gallery().asset_bytes));
     lightloom_stream_info info{};
     info.struct_size = sizeof info;
     info.flags = LIGHTLOOM_STREAM_NO_THREAD;
-    info.read_chunk = Gallery::read_chunk;
-    info.read_user = &store_;
+    info.read_chunk = LoomReader::read;
+    info.read_user = &reader_;
     info.byte_budget = budget_;
     EXPECT_EQ(lightloom_stream_create(runtime, &info, &stream_), LIGHTLOOM_OK);
   }
@@ -83,7 +75,7 @@ class Stream {
   }
 
  private:
-  ChunkStore store_;
+  LoomReader reader_;
   uint64_t budget_ = 0;
   lightloom_stream* stream_ = nullptr;
 };

@@ -43,15 +43,7 @@ class Amortised : public ::testing::Test {
     EXPECT_TRUE(rays.ok()) << rays.status();
     return *std::move(rays);
   }
-  /// Runs frames until nothing is left to do; returns how many it took.
-  int settle(int at_most = 400) {
-    for (int frame = 0; frame < at_most; ++frame) {
-      EXPECT_EQ(lightloom_update(runtime_.get(), 1), LIGHTLOOM_OK);
-      if (runtime_.stats().skipped == 1) return frame;
-    }
-    ADD_FAILURE() << "still working";
-    return at_most;
-  }
+  int settle(int at_most = 400) { return runtime_.settle(at_most); }
 
   SyntheticAsset asset_;
   AssetSource source_;

@@ -67,13 +67,6 @@ class DetailTest : public ::testing::TestWithParam<uint32_t> {
     runtime->light(light_);
     return runtime;
   }
-  static void settle(TestRuntime& runtime) {
-    for (int frame = 0; frame < 400; ++frame) {
-      ASSERT_EQ(lightloom_update(runtime.get(), 1), LIGHTLOOM_OK);
-      if (runtime.stats().skipped == 1) return;
-    }
-    FAIL() << "still working";
-  }
   void load_cells(TestRuntime& runtime, uint32_t max_rank, uint32_t bands = 0) const {
     for (const CellEntry& c : asset_.manifest.cells) {
       ASSERT_EQ(runtime.load_part(asset_, c.chunk.digest, max_rank, false, false, bands), LIGHTLOOM_OK);
@@ -121,10 +114,10 @@ TEST_P(DetailTest, FewColumnsAndBandsAreThoseOfTheDecoder) {
 TEST_P(DetailTest, FewRaysGiveNearlyTheSameLight) {
   const auto runtime = lit_runtime();
   load_cells(*runtime, 0);
-  settle(*runtime);
+  runtime->settle();
   const std::vector<Vec3> all = runtime->irradiance();
   load_probes(*runtime, true);
-  settle(*runtime);
+  runtime->settle();
   const std::vector<Vec3> few = runtime->irradiance();
   EXPECT_NE(all, few);
   // Rays of this asset end anywhere: 256 of 1024 random samples. In a level neighbours agree.
@@ -140,13 +133,13 @@ TEST_P(DetailTest, FewRaysGiveNearlyTheSameLight) {
   ASSERT_EQ(lightloom_set_direct(runtime->get(), &light_.direct[0].x, 0, light_.direct.size()), LIGHTLOOM_OK);
   // And back.
   load_probes(*runtime, false);
-  settle(*runtime);
+  runtime->settle();
   EXPECT_LT(p999_error(runtime->irradiance(), all), 1e-5);
 }
 
 TEST_P(DetailTest, AnyOrderOfDetailsEndsAtTheSameLight) {
   const auto runtime = lit_runtime();
-  settle(*runtime);
+  runtime->settle();
   const std::vector<Vec3> whole = runtime->irradiance();
   runtime->options(0, 0, 0, 1, 0.5f);
   Rng rng(1);
@@ -193,7 +186,7 @@ TEST_P(DetailTest, AnyOrderOfDetailsEndsAtTheSameLight) {
   ASSERT_EQ(lightloom_update(runtime->get(), 8), LIGHTLOOM_OK);
   for (const ProbeEntry& p : probes) ASSERT_EQ(runtime->load_part(asset_, p.relight.digest, 0), LIGHTLOOM_OK);
   load_cells(*runtime, kAll);
-  settle(*runtime);
+  runtime->settle();
   EXPECT_EQ(runtime->counts().active_cells, cells.size());
   EXPECT_LT(p999_error(runtime->irradiance(), whole), 1e-4);
 }
@@ -209,13 +202,13 @@ TEST_P(DetailTest, ABaseIsThereAgainOnceTheRestIsDropped) {
     ASSERT_EQ(lightloom_unload_chunk(runtime->get(), p.relight.digest.bytes.data()), LIGHTLOOM_OK);
     ASSERT_EQ(runtime->load_part(asset_, p.relight.digest, 0, true, true), LIGHTLOOM_OK);
   }
-  settle(*runtime);
+  runtime->settle();
   const std::vector<Vec3> base = runtime->irradiance();
   const uint64_t bytes = runtime->counts().gpu_bytes;
   for (int times = 0; times < 3; ++times) {
     load_cells(*runtime, kAll);
     load_probes(*runtime, false);
-    settle(*runtime);
+    runtime->settle();
     EXPECT_NE(runtime->irradiance(), base);
     for (const CellEntry& c : asset_.manifest.cells) {
       ASSERT_EQ(lightloom_drop_detail(runtime->get(), c.chunk.digest.bytes.data()), LIGHTLOOM_OK);
@@ -224,7 +217,7 @@ TEST_P(DetailTest, ABaseIsThereAgainOnceTheRestIsDropped) {
       ASSERT_EQ(lightloom_drop_detail(runtime->get(), p.relight.digest.bytes.data()), LIGHTLOOM_OK);
     }
     EXPECT_EQ(runtime->counts().pending_bytes, 0u);
-    settle(*runtime);
+    runtime->settle();
     EXPECT_LT(p999_error(runtime->irradiance(), base), 1e-5);
   }
   if (GetParam() == LIGHTLOOM_CREATE_CPU) {
@@ -236,8 +229,8 @@ TEST_P(DetailTest, AnotherModelFadesInAndLightDoesNot) {
   for (Vec3& a : light_.albedo) a = {};  // no second bounce
   const auto faded = lit_runtime(), plain = lit_runtime();
   faded->options(0, 0, 0, 1, 0.25f);
-  settle(*faded);
-  settle(*plain);
+  faded->settle();
+  plain->settle();
   const std::vector<Vec3> before = faded->irradiance();
   EXPECT_EQ(before, plain->irradiance());
 
@@ -269,14 +262,14 @@ TEST_P(DetailTest, AnotherModelFadesInAndLightDoesNot) {
   EXPECT_GT(light_jump, 4 * jump);
   EXPECT_LE(far(faded->irradiance(), plain->irradiance()), 0.75 * left * 1.001);
 
-  settle(*faded);
+  faded->settle();
   EXPECT_LT(p999_error(faded->irradiance(), plain->irradiance()), 1e-6);
 }
 
 TEST_P(DetailTest, TheFirstModelOfACellIsThereAtOnce) {
   for (Vec3& a : light_.albedo) a = {};
   const auto plain = lit_runtime();
-  settle(*plain);
+  plain->settle();
   const auto faded = lit_runtime();
   faded->options(0, 0, 0, 1, 0.1f);
   ASSERT_EQ(lightloom_update(faded->get(), 1), LIGHTLOOM_OK);
@@ -287,7 +280,7 @@ class UploadTest : public DetailTest {};
 
 TEST_P(UploadTest, TheOldModelLightsUntilTheNewOneIsThere) {
   const auto runtime = lit_runtime();
-  settle(*runtime);
+  runtime->settle();
   const std::vector<Vec3> before = runtime->irradiance();
   lightloom_update_options o{};
   o.struct_size = sizeof o;

@@ -48,13 +48,6 @@ class ReloadTest : public ::testing::TestWithParam<uint32_t> {
     }
     return out;
   }
-  static void settle(TestRuntime& runtime) {
-    for (int frame = 0; frame < 400; ++frame) {
-      ASSERT_EQ(lightloom_update(runtime.get(), 1), LIGHTLOOM_OK);
-      if (runtime.stats().skipped == 1) return;
-    }
-    FAIL() << "still working";
-  }
   lightloom_result reload(TestRuntime& runtime, const std::vector<uint8_t>& manifest) {
     return lightloom_reload_manifest(runtime.get(), manifest.data(), manifest.size());
   }
@@ -79,7 +72,7 @@ TEST_P(ReloadTest, WhatStaysGoesOnAsItWasLit) {
     TestRuntime runtime(GetParam() | smoothing);
     ASSERT_EQ(runtime.load(before_), LIGHTLOOM_OK);
     runtime.light(light_);
-    settle(runtime);
+    runtime.settle();
     const std::vector<Vec3> lit = moved(runtime.irradiance());
 
     ASSERT_EQ(reload(runtime, encode_manifest(after_.manifest)), LIGHTLOOM_OK) << joined(runtime.received().errors);
@@ -93,7 +86,7 @@ TEST_P(ReloadTest, WhatStaysGoesOnAsItWasLit) {
     ASSERT_EQ(lightloom_update(runtime.get(), 1), LIGHTLOOM_OK);
     EXPECT_LT(p999_error(runtime.irradiance(), lit), 1e-4);
     ASSERT_EQ(lightloom_reset_feedback(runtime.get()), LIGHTLOOM_OK);
-    settle(runtime);
+    runtime.settle();
     EXPECT_LT(p999_error(runtime.irradiance(), lit), 1e-4);
   }
 }
@@ -102,7 +95,7 @@ TEST_P(ReloadTest, TwiceInARowAndAtOnceAfterAReset) {
   TestRuntime runtime(GetParam());
   ASSERT_EQ(runtime.load(before_), LIGHTLOOM_OK);
   runtime.light(light_);
-  settle(runtime);
+  runtime.settle();
   const std::vector<Vec3> lit = runtime.irradiance();
   ASSERT_EQ(reload(runtime, encode_manifest(after_.manifest)), LIGHTLOOM_OK);
   ASSERT_EQ(lightloom_update(runtime.get(), 1), LIGHTLOOM_OK);
@@ -120,7 +113,7 @@ TEST_P(ReloadTest, AnObjectWithOtherTexelsIsNotBlack) {
   TestRuntime runtime(GetParam());
   ASSERT_EQ(runtime.load(before_), LIGHTLOOM_OK);
   runtime.light(light_);
-  settle(runtime);
+  runtime.settle();
   const std::vector<Vec3> lit = runtime.irradiance();
   SyntheticAsset fewer = testing::empty_asset(4, 200);
   const ObjectEntry& old = before_.manifest.objects[0];
@@ -148,7 +141,7 @@ TEST_P(ReloadTest, ABadManifestChangesNothing) {
   EXPECT_EQ(reload(runtime, manifest), LIGHTLOOM_ERROR_NO_ASSET);
   ASSERT_EQ(runtime.load(before_), LIGHTLOOM_OK);
   runtime.light(light_);
-  settle(runtime);
+  runtime.settle();
   const std::vector<Vec3> lit = runtime.irradiance();
   manifest[100] ^= 1;
   EXPECT_EQ(reload(runtime, manifest), LIGHTLOOM_ERROR_CORRUPT_ASSET);

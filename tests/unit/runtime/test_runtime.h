@@ -89,6 +89,15 @@ class TestRuntime {
     EXPECT_EQ(lightloom_read_irradiance(runtime_, &e[0].x, e.size()), LIGHTLOOM_OK);
     return e;
   }
+  /// Runs frames until nothing is left to do; returns how many it took.
+  int settle(int at_most = 400) {
+    for (int frame = 0; frame < at_most; ++frame) {
+      EXPECT_EQ(lightloom_update(runtime_, 1), LIGHTLOOM_OK);
+      if (stats().skipped == 1) return frame;
+    }
+    ADD_FAILURE() << "still working";
+    return at_most;
+  }
   lightloom_stats stats() const {
     lightloom_stats s{};
     s.struct_size = sizeof s;

@@ -88,19 +88,14 @@ class StreamTest : public ::testing::TestWithParam<uint32_t> {
     FAIL() << "the stream does not end";
   }
   std::vector<Vec3> settled() {
-    int frames = 0;
-    do {  // at least one: what the frame before was skipped for may have come since
-      EXPECT_EQ(lightloom_update(runtime_.get(), 1), LIGHTLOOM_OK);
-    } while (runtime_.stats().skipped == 0 && ++frames < 400);
+    runtime_.settle();
     return runtime_.irradiance();
   }
   std::vector<Vec3> whole() {
     TestRuntime other(GetParam() | LIGHTLOOM_CREATE_SMOOTHING);
     EXPECT_EQ(other.load(asset_), LIGHTLOOM_OK);
     other.light(light_);
-    for (int frame = 0; frame < 400 && other.stats().skipped == 0; ++frame) {
-      EXPECT_EQ(lightloom_update(other.get(), 1), LIGHTLOOM_OK);
-    }
+    other.settle();
     return other.irradiance();
   }
 
