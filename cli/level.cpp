@@ -5,6 +5,7 @@
 #include "cli/files.h"
 #include "cli/interrupt.h"
 #include "core/base/text.h"
+#include "core/receivers/reversed.h"
 #include "core/scene/defects.h"
 #include "core/scene/gltf.h"
 #include "core/scene/picture.h"
@@ -57,7 +58,6 @@ absl::StatusOr<Level> load_level(const std::string& path, const std::string& lig
   if (const std::string defects = describe(find_defects(scene)); !defects.empty()) {
     warning += (warning.empty() ? "" : "; ") + defects;
   }
-  if (!warning.empty()) std::fprintf(stderr, "warning: %s: %s\n", path.c_str(), escape_controls(warning).c_str());
   LL_RETURN_IF_ERROR(not_interrupted());
   if (!lights.empty()) {
     LL_ASSIGN_OR_RETURN(const Rig chosen, choose_rig(lights, rig));
@@ -67,6 +67,14 @@ absl::StatusOr<Level> load_level(const std::string& path, const std::string& lig
   Level level;
   level.scene = std::make_unique<Scene>(std::move(scene));
   LL_ASSIGN_OR_RETURN(level.tracer, RayTracer::create(*level.scene));
+  std::vector<Object> reversed;
+  for (const uint32_t o : reversed_objects(*level.tracer, {}))
+    reversed.emplace_back().name = level.scene->objects[o].name;
+  if (!reversed.empty()) {
+    warning += (warning.empty() ? "" : "; ") + std::string("modelled inside out, by what is seen from behind: ") +
+               names(reversed) + " (turn the faces, or make the materials double-sided)";
+  }
+  if (!warning.empty()) std::fprintf(stderr, "warning: %s: %s\n", path.c_str(), escape_controls(warning).c_str());
   LL_RETURN_IF_ERROR(not_interrupted());
   return level;
 }

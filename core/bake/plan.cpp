@@ -14,8 +14,9 @@ namespace {
 
 /// Probe cells are counted in int32, and a level has as many as fit its bounds.
 absl::Status check_spacing(float spacing, const Aabb& bounds) {
-  constexpr double kMostCells = 4096;    // along a side of the level
-  constexpr double kFarthest = 1 << 30;  // cells from the origin
+  if (bounds.empty()) return absl::OkStatus();  // nothing to bake is said elsewhere
+  constexpr double kMostCells = 4096;           // along a side of the level
+  constexpr double kFarthest = 1 << 30;         // cells from the origin
   double side = 0, farthest = 0;
   for (int a = 0; a < 3; ++a) {
     side = std::max(side, static_cast<double>(bounds.hi[a]) - static_cast<double>(bounds.lo[a]));
