@@ -161,7 +161,7 @@ class VulkanAsset {
   Buffer radiosity_, points_, normals_, lambda_, changed_, dirty_, slot_seen_, stamps_;
   std::array<Buffer, 2> sh_;  ///< of every ray, and of the coarse sets'
   Buffer active_slots_, cell_probes_, cell_dirty_, cell_seen_, active_cells_, control_;
-  Image image_;
+  DeviceImage image_;
   std::unique_ptr<DescriptorSets> sets_;
   std::vector<VkDescriptorSet> radiosity_sets_, direct_sets_, shadowed_sets_;  ///< per frame in flight
   std::vector<VkDescriptorBufferInfo> bound_direct_;                           ///< what radiosity_sets_ bind

@@ -59,7 +59,7 @@ void VulkanAsset::free_all_but_light() {
   for (ShadowTable* t : {&inputs_[0], &inputs_[1], &inputs_[2], &cell_table_, &slot_table_, &map_table_}) {
     t->free_device();
   }
-  image_ = Image();
+  image_ = DeviceImage();
 }
 
 void VulkanAsset::inherit(VulkanAsset* before, std::span<const AssetIndex::Kept> kept) {
@@ -136,8 +136,8 @@ absl::Status VulkanAsset::create_arrays() {
     LL_RETURN_IF_ERROR(map_table_.create(context_, 4 * texels, 4, 0xff));
     map_ = std::make_unique<LightmapMap>(index_.width(), index_.height(), std::span(map_table_.as<uint32_t>(), texels),
                                          memory_);
-    LL_ASSIGN_OR_RETURN(image_,
-                        Image::create(context_, options_.image_format, index_.width(), index_.height(), kImageLayers));
+    LL_ASSIGN_OR_RETURN(
+        image_, DeviceImage::create(context_, options_.image_format, index_.width(), index_.height(), kImageLayers));
   }
   return absl::OkStatus();
 }

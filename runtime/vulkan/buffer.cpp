@@ -122,8 +122,8 @@ absl::Status Buffer::invalidate(uint64_t offset, uint64_t bytes) const {
                        "vkInvalidateMappedMemoryRanges");
 }
 
-absl::StatusOr<Image> Image::create(Context* context, VkFormat format, uint32_t width, uint32_t height,
-                                    uint32_t layers) {
+absl::StatusOr<DeviceImage> DeviceImage::create(Context* context, VkFormat format, uint32_t width, uint32_t height,
+                                                uint32_t layers) {
   if (width > context->limits.maxImageDimension2D || height > context->limits.maxImageDimension2D) {
     return absl::UnimplementedError("lightmap of " + std::to_string(width) + " x " + std::to_string(height) +
                                     " texels, this device has images of at most " +
@@ -131,7 +131,7 @@ absl::StatusOr<Image> Image::create(Context* context, VkFormat format, uint32_t 
                                     "; bake it coarser or create without image_format");
   }
   const VulkanTable& vk = context->vk;
-  Image image;
+  DeviceImage image;
   image.context_ = context;
   auto info = vulkan_struct<VkImageCreateInfo>(VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO);
   info.imageType = VK_IMAGE_TYPE_2D;
@@ -164,7 +164,7 @@ absl::StatusOr<Image> Image::create(Context* context, VkFormat format, uint32_t 
   return image;
 }
 
-Image& Image::operator=(Image&& other) noexcept {
+DeviceImage& DeviceImage::operator=(DeviceImage&& other) noexcept {
   std::swap(context_, other.context_);
   std::swap(handle_, other.handle_);
   std::swap(view_, other.view_);
@@ -173,7 +173,7 @@ Image& Image::operator=(Image&& other) noexcept {
   return *this;
 }
 
-void Image::reset() {
+void DeviceImage::reset() {
   if (context_ == nullptr) return;
   context_->vk.DestroyImageView(context_->device, view_, context_->callbacks);
   context_->vk.DestroyImage(context_->device, handle_, context_->callbacks);

@@ -44,15 +44,15 @@ class Buffer {
 };
 
 /// E as a 2D array image that shaders write and engines sample.
-class Image {
+class DeviceImage {
  public:
-  Image() = default;
-  ~Image() { reset(); }
-  Image(Image&& other) noexcept { *this = std::move(other); }
-  Image& operator=(Image&& other) noexcept;
+  DeviceImage() = default;
+  ~DeviceImage() { reset(); }
+  DeviceImage(DeviceImage&& other) noexcept { *this = std::move(other); }
+  DeviceImage& operator=(DeviceImage&& other) noexcept;
 
-  static absl::StatusOr<Image> create(Context* context, VkFormat format, uint32_t width, uint32_t height,
-                                      uint32_t layers);
+  static absl::StatusOr<DeviceImage> create(Context* context, VkFormat format, uint32_t width, uint32_t height,
+                                            uint32_t layers);
 
   VkImage handle() const { return handle_; }
   VkImageView view() const { return view_; }
