@@ -29,6 +29,21 @@ absl::Status check_spacing(float spacing, const Aabb& bounds) {
                                     std::to_string(least) + " to 1000000 m, or 0: chosen from the level");
 }
 
+/// Rays keep a distance from surfaces that grows with that from the origin, as the rounding of floats does. Where it is
+/// no longer small against a texel, light would be gathered from beside the surface, and from behind thin ones.
+absl::Status check_place(const Aabb& bounds, float texels_per_metre) {
+  if (bounds.empty() || !(texels_per_metre > 0)) return absl::OkStatus();
+  const Vec3 farthest{std::max(std::abs(bounds.lo.x), std::abs(bounds.hi.x)),
+                      std::max(std::abs(bounds.lo.y), std::abs(bounds.hi.y)),
+                      std::max(std::abs(bounds.lo.z), std::abs(bounds.hi.z))};
+  const float offset = RayTracer::offset(farthest), texel = 1 / texels_per_metre;
+  if (offset <= 0.25f * texel) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      "texels of " + std::to_string(texel) + " m are too small where this level lies: up to " +
+      std::to_string(std::max({farthest.x, farthest.y, farthest.z})) + " m from the origin, where rays keep " +
+      std::to_string(offset) + " m off surfaces; move the level to the origin, or lower --texels-per-metre");
+}
+
 /// Octree over the world: the root is the same for every level, so a leaf depends on the receivers above it only.
 class Octree {
  public:
@@ -127,6 +142,7 @@ absl::StatusOr<Plan> make_plan(const RayTracer& tracer, const BakeParams& reques
   layout_options.texels_per_metre = request.texels_per_metre;
   LL_ASSIGN_OR_RETURN(plan.layout, make_layout(scene, layout_options));
   plan.params.texels_per_metre = plan.layout.texels_per_metre;
+  LL_RETURN_IF_ERROR(check_place(scene.bounds(), plan.layout.texels_per_metre));
   if (plan.layout.mode == LayoutMode::kScene) plan.params.lightmap_size = plan.layout.width;
 
   const Stopwatch receivers_watch;

@@ -116,7 +116,7 @@ TEST(StabilityDegenerate, NothingToBakeIsAnError) {
   double refused = 0;
   for (const Scene& scene : {Scene{}, dynamic}) {
     const std::string error = refusal(scene);
-    EXPECT_THAT(error, testing::HasSubstr("static objects that receive a lightmap"));
+    EXPECT_THAT(error, ::testing::HasSubstr("static objects that receive a lightmap"));
     EXPECT_EQ(error.find('\n'), std::string::npos);
     refused += error.find("give the level static objects") != std::string::npos;
   }

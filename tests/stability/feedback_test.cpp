@@ -16,7 +16,7 @@ int frames(float albedo) { return static_cast<int>(std::ceil(std::log(1e-4) / st
 
 std::string percent(float albedo) { return std::to_string(std::lround(100 * albedo)) + " %"; }
 
-class StabilityFurnace : public testing::TestWithParam<float> {};
+class StabilityFurnace : public ::testing::TestWithParam<float> {};
 
 // Every wall emits radiance L and reflects a: L_out = L + a·L_out, so E = π·L ÷ (1 − a) everywhere.
 TEST_P(StabilityFurnace, EveryReceiverReachesTheClosedForm) {
@@ -36,10 +36,10 @@ TEST_P(StabilityFurnace, EveryReceiverReachesTheClosedForm) {
           [&] { return beside(*level, e, expected); });
   }
 }
-INSTANTIATE_TEST_SUITE_P(Albedo, StabilityFurnace, testing::Values(0.5f, 0.9f, 0.99f),
+INSTANTIATE_TEST_SUITE_P(Albedo, StabilityFurnace, ::testing::Values(0.5f, 0.9f, 0.99f),
                          [](const auto& info) { return std::to_string(std::lround(1000 * info.param)); });
 
-class StabilityLampInABox : public testing::TestWithParam<float> {};
+class StabilityLampInABox : public ::testing::TestWithParam<float> {};
 
 // A lamp in a closed box whose walls all reflect a: of its power Φ = 4π·I every bounce keeps the share a, whatever the
 // shape, so ∫E dA = Φ·a ÷ (1 − a). And adding light, frame by frame, must never take it away or overshoot.
@@ -66,7 +66,7 @@ TEST_P(StabilityLampInABox, EnergyIsTheGeometricSum) {
   check({Case::kFeedback, "growth when the frames are doubled, lamp in a box, albedo " + percent(a), later / power - 1,
          0.005});
 }
-INSTANTIATE_TEST_SUITE_P(Albedo, StabilityLampInABox, testing::Values(0.5f, 0.8f, 0.95f, 0.99f),
+INSTANTIATE_TEST_SUITE_P(Albedo, StabilityLampInABox, ::testing::Values(0.5f, 0.8f, 0.95f, 0.99f),
                          [](const auto& info) { return std::to_string(std::lround(1000 * info.param)); });
 
 }  // namespace

@@ -12,6 +12,7 @@
 namespace lightloom::stability {
 namespace {
 
+constexpr int kPictureWidth = 160;
 constexpr float kPictureAspect = 4.0f / 3;
 
 Camera camera_of(const Scene& scene, const View& view) {
@@ -25,7 +26,7 @@ Camera camera_of(const Scene& scene, const View& view) {
     const Aabb box = scene.bounds();
     camera.yfov = 0.5f;
     to = box.center();
-    camera.position = to + normalize({0.35f, 0.75f, 1}) * (0.36f * length(box.size()) / std::sin(0.25f));
+    camera.position = to + normalize(view.direction) * (0.42f * length(box.size()) / std::sin(0.25f));
   }
   camera.forward = normalize(to - camera.position);
   camera.right = normalize(cross(camera.forward, {0, 1, 0}));
@@ -213,7 +214,7 @@ double difference(const BakedLevel& level, const Field& a, const Field& b) {
 Image picture(const BakedLevel& level, const Field& e, const View& view, float* exposure) {
   constexpr uint32_t kSide = 2;  // points per pixel, squared
   const Camera camera = camera_of(*level.scene, view);
-  Image out(view.width, value_or_die(image_height(camera, view.width)), {"R", "G", "B"});
+  Image out(kPictureWidth, value_or_die(image_height(camera, kPictureWidth)), {"R", "G", "B"});
   const ReceiverSearch search(*level.scene, level.elements.layout, level.elements.receivers);
   parallel_for(static_cast<uint64_t>(out.height), {}, [&](uint64_t row) {
     for (int x = 0; x < out.width; ++x) {

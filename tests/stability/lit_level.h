@@ -52,13 +52,13 @@ Comparison error(const BakedLevel& level, const Field& e, const Truth& truth, co
 /// ‖a − b‖₂ ÷ ‖b‖₂, area-weighted, of fields that need not be of the same bake but have the same elements.
 double difference(const BakedLevel& level, const Field& a, const Field& b);
 
-/// E/π from outside and above, through all surfaces seen from behind; from inside where `from` and `to` say so. `exposure`
-/// 0: chosen, and returned.
+/// Surfaces seen from behind are looked through.
 struct View {
-  bool inside = false;
-  Vec3 from, to;
-  int width = 160;
+  Vec3 direction{0.35f, 0.75f, 1};  ///< to a camera outside that has the whole level in view
+  bool inside = false;              ///< instead: a camera at `from` that looks at `to`
+  Vec3 from{}, to{};
 };
+/// E/π, 160 pixels wide. `exposure` 0: chosen, and returned.
 Image picture(const BakedLevel& level, const Field& e, const View& view, float* exposure);
 /// Side by side: `a`, `b` by the same exposure, and 8 times their difference as the eye sees it. b is the truth.
 Image beside(const BakedLevel& level, const Field& a, const Field& b, const View& view = {});

@@ -20,7 +20,7 @@ constexpr std::array<const char*, 11> kCases{"sealed rooms",  "near lights",    
 
 /// What all files of the running test begin with.
 std::string file_stem(Case of) {
-  const testing::TestInfo& test = *testing::UnitTest::GetInstance()->current_test_info();
+  const ::testing::TestInfo& test = *::testing::UnitTest::GetInstance()->current_test_info();
   std::array<char, 3> number{};
   std::snprintf(number.data(), number.size(), "%02u", static_cast<unsigned>(of) % 100);
   std::string stem = std::string(number.data()) + "-" + test.test_suite_name() + "." + test.name();

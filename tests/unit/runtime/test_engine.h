@@ -4,12 +4,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
 #include <functional>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "core/base/half.h"
 #include "runtime/include/lightloom_vulkan.h"
 #include "runtime/vulkan/barriers.h"
 #include "runtime/vulkan/buffer.h"
@@ -145,6 +147,33 @@ class Engine {
     std::vector<Vec3> out(S);
     for (uint32_t s = 0; s < S; ++s) out[s] = {values[3 * s], values[3 * s + 1], values[3 * s + 2]};
     return out;
+  }
+  /// E as the image has it: R, G, B, A of each texel, layer by layer.
+  std::vector<float> read_image() {
+    const lightloom_vulkan_outputs out = outputs();
+    const auto copy_image = function<PFN_vkCmdCopyImageToBuffer>("vkCmdCopyImageToBuffer");
+    const size_t values = size_t{4} * out.image_width * out.image_height * out.image_layers;
+    const bool halfs = out.image_format == VK_FORMAT_R16G16B16A16_SFLOAT;
+    std::vector<float> image = read(halfs ? values / 2 : values, [&](VkCommandBuffer commands, VkBuffer to) {
+      VkBufferImageCopy region{};
+      region.imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, out.image_layers};
+      region.imageExtent = {out.image_width, out.image_height, 1};
+      auto barrier = vulkan_struct<VkImageMemoryBarrier>(VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER);
+      barrier.dstAccessMask = VK_ACCESS_TRANSFER_READ_BIT;
+      barrier.oldLayout = VK_IMAGE_LAYOUT_GENERAL;
+      barrier.newLayout = VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL;
+      barrier.image = out.image;
+      barrier.subresourceRange = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, out.image_layers};
+      context_.vk.CmdPipelineBarrier(commands, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, VK_PIPELINE_STAGE_TRANSFER_BIT, 0, 0,
+                                     nullptr, 0, nullptr, 1, &barrier);
+      copy_image(commands, out.image, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, to, 1, &region);
+    });
+    if (!halfs) return image;
+    std::vector<Half> packed(values);
+    std::memcpy(packed.data(), image.data(), values * sizeof(Half));
+    image.assign(values, 0);
+    std::transform(packed.begin(), packed.end(), image.begin(), half_to_float);
+    return image;
   }
   template <class F>
   F function(const char* name) const {
