@@ -11,9 +11,10 @@ thread_local const CancelFlag* cancel_of_task = nullptr;
 /// For threads that hold a slot of the gate: others compute while a blob is on its way.
 class RemoteBlobs final : public BlobAccess {
  public:
-  RemoteBlobs(std::shared_ptr<grpc::Channel> channel, ComputeGate* gate)
-      : client_(std::move(channel),
-                patience_of_tasks([] { return cancel_of_task != nullptr && cancel_of_task->cancelled(); })),
+  RemoteBlobs(std::shared_ptr<grpc::Channel> channel, ComputeGate* gate, bool wait_for_room)
+      : client_(
+            std::move(channel),
+            patience_of_tasks([] { return cancel_of_task != nullptr && cancel_of_task->cancelled(); }, wait_for_room)),
         gate_(gate) {}
   absl::StatusOr<std::vector<uint8_t>> get(const Digest& digest) override {
     const ComputeGate::Pause pause(gate_);
@@ -31,9 +32,10 @@ class RemoteBlobs final : public BlobAccess {
 
 }  // namespace
 
-LocalExecutor::LocalExecutor(std::shared_ptr<grpc::Channel> channel, uint32_t threads, uint64_t cache_bytes)
+LocalExecutor::LocalExecutor(std::shared_ptr<grpc::Channel> channel, uint32_t threads, uint64_t cache_bytes,
+                             bool wait_for_room)
     : gate_(threads),
-      blobs_(std::make_unique<RemoteBlobs>(std::move(channel), &gate_)),
+      blobs_(std::make_unique<RemoteBlobs>(std::move(channel), &gate_, wait_for_room)),
       runner_(blobs_.get(), cache_bytes, [this](const std::function<void()>& wait) {
         const ComputeGate::Pause pause(&gate_);
         wait();

@@ -27,12 +27,8 @@ constexpr int kManyFailures = 10;
 /// More than threads: some wait for the network.
 uint32_t begun_at_once(uint32_t threads) { return threads + 1 + threads / 8; }
 
-/// The server will not hear of this worker, however often it asks. `known`: it has heard of it before.
-bool is_final(const absl::Status& status, bool known) {
-  // A server that is stopping answers as if it had no such call.
-  return absl::IsFailedPrecondition(status) || absl::IsInvalidArgument(status) ||
-         (absl::IsUnimplemented(status) && !known);
-}
+/// Of the server's disk.
+bool is_no_room(const absl::Status& status) { return absl::IsResourceExhausted(status) && !is_out_of_memory(status); }
 
 }  // namespace
 
@@ -73,6 +69,10 @@ void Worker::drain_locked() {
 
 void Worker::stop() {
   const std::lock_guard lock(mutex_);
+  stop_locked();
+}
+
+void Worker::stop_locked() {
   drain_locked();
   stopping_ = true;
   for (auto& [attempt, running] : running_) running->cancel.cancel();
@@ -112,14 +112,16 @@ void Worker::run_task(const std::string& attempt, Running* running) {
   absl::StatusOr<TaskOutput> output = absl::CancelledError("cancelled");
   if (!running->cancel.cancelled()) output = run_within_memory(&executor_, running->task, control);
   const double seconds = std::chrono::duration<double>(Clock::now() - begun).count();
-  const absl::Status health = output.ok() ? absl::OkStatus() : executor_.health();
+  absl::Status health = output.ok() ? absl::OkStatus() : executor_.health();
   Report report = report_of(std::move(output), running->cancel);
+  const bool full = !options_.wait_for_room && is_no_room(report.output.status());
+  if (full) health = report.output.status();
 
   std::unique_lock lock(mutex_);
   std::string trouble;
   if (!health.ok() && health_.ok()) {
     health_ = health;
-    drain_locked();
+    full ? stop_locked() : drain_locked();  // what the others make would find no room either
   }
   if (running->lost) {
     hungry_ = true;
@@ -144,16 +146,24 @@ void Worker::run_task(const std::string& attempt, Running* running) {
 /// What has to be uploaded for it is on the server.
 Worker::Report Worker::report_of(absl::StatusOr<TaskOutput> output, const CancelFlag& cancel) {
   if (!output.ok()) return {std::move(output), std::nullopt};
-  auto blob = upload_if_long(channel_, output->spawned, cancel);
+  auto blob = upload_if_long(channel_, output->spawned, cancel, options_.wait_for_room);
   if (!blob.ok()) return {cancel.cancelled() ? absl::CancelledError("cancelled") : blob.status(), std::nullopt};
   if (*blob) output->spawned.clear();
   return {std::move(output), *blob};
 }
 
+/// The server will not hear of this worker, however often it asks, or need not be asked again.
+bool Worker::is_final(const absl::Status& status) const {
+  // A server that is stopping answers as if it had no such call.
+  const bool known = synced_ != Clock::time_point();
+  return absl::IsFailedPrecondition(status) || absl::IsInvalidArgument(status) ||
+         (absl::IsUnimplemented(status) && !known) || (is_no_room(status) && !options_.wait_for_room);
+}
+
 absl::Status Worker::run() {
   for (;;) {
     const absl::Status status = sync_once();
-    if (is_final(status, synced_ != Clock::time_point())) return status;
+    if (is_final(status)) return status;
     note(status);
     std::unique_lock lock(mutex_);
     if (draining_ && running_.empty() && !has_news()) return health_;

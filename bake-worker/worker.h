@@ -31,6 +31,8 @@ struct WorkerOptions {
   /// Told in one line: that Syncs fail and why, once for each kind of error, and that they work again; that many tasks
   /// in a row failed. From any thread of the worker.
   std::function<void(const std::string&)> on_trouble = [](const std::string&) {};
+  /// Whether a server whose disk is full is waited for. The executor's setting should be the same.
+  bool wait_for_room = true;
 };
 
 /// Begins somewhat more tasks than may compute, so that cores have work while results are on their way, and has more of
@@ -44,7 +46,8 @@ class Worker {
   Worker& operator=(const Worker&) = delete;
 
   /// Works until drain() or stop(); until the server refuses it: FailedPrecondition with the reason; until the executor can
-  /// run no more tasks: Unavailable with the reason, when what it had is handed back.
+  /// run no more tasks: Unavailable with the reason, when what it had is handed back; until the server's disk is full, if
+  /// that is not waited for: ResourceExhausted with the reason.
   absl::Status run();
   /// Takes no more tasks; run() returns when those that it has begun are done and on record. Any thread.
   void drain();
@@ -68,10 +71,12 @@ class Worker {
   void execute();
   void run_task(const std::string& attempt, Running* running);
   Report report_of(absl::StatusOr<TaskOutput> output, const CancelFlag& cancel);
+  bool is_final(const absl::Status& status) const;
   absl::Status sync_once();
   void note(const absl::Status& sync);
   /// These need mutex_.
   void drain_locked();
+  void stop_locked();
   uint32_t room() const;
   bool has(const std::string& attempt) const;
   void take_warm_up(const std::string& payload);
@@ -92,7 +97,7 @@ class Worker {
   std::map<std::pair<int64_t, uint64_t>, std::string> queue_;  // not begun, by (-priority, arrival)
   std::map<std::string, Report> finished_;                     // to be reported until acknowledged
   std::vector<std::string> released_;
-  absl::Status health_;                    // the executor's
+  absl::Status health_;                    // an error: no task can be done here any more
   bool hungry_ = true;                     // the server had less than there was room for
   Clock::time_point synced_, news_since_;  // last answer; first news since the last Sync was sent
   double mean_seconds_ = 0;                // of recent tasks; 0: not known

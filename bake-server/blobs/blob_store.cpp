@@ -16,10 +16,10 @@ namespace {
 
 constexpr size_t kPiece = size_t{1} << 20;
 
-absl::Status failed(const fs::path& path, const char* what) {
-  const std::string reason = std::string("cannot ") + what + " " + path.string() + ": " + std::strerror(errno);
-  return errno == ENOSPC || errno == EDQUOT ? absl::ResourceExhaustedError(reason + "; free space there")
-                                            : absl::UnavailableError(reason);
+absl::Status failed(const fs::path& path, const char* what, int error = errno) {
+  const std::string reason = std::string("cannot ") + what + " " + path.string() + ": " + std::strerror(error);
+  return error == ENOSPC || error == EDQUOT ? absl::ResourceExhaustedError(reason + "; free space there")
+                                            : absl::UnavailableError(reason + "; check that disk and its permissions");
 }
 
 /// A file descriptor, closed at the end.
@@ -112,9 +112,7 @@ absl::StatusOr<std::unique_ptr<BlobStore>> BlobStore::open(const fs::path& folde
   for (const fs::path& sub : {store->layout_.uploads(), store->layout_.trash()}) {
     std::error_code error;
     fs::create_directories(sub, error);
-    if (error) {
-      return absl::UnavailableError("cannot make " + sub.string() + ": " + error.message() + "; choose another folder");
-    }
+    if (error) return failed(sub, "make", error.value());
   }
   return store;
 }
@@ -206,11 +204,11 @@ absl::Status BlobStore::commit(const fs::path& temporary, const Digest& digest) 
   const fs::path path = layout_.blob(digest);
   std::error_code error;
   fs::create_directories(path.parent_path(), error);
+  if (error) return failed(path.parent_path(), "make", error.value());
   touch(temporary);  // its last byte may have come long ago
   if (durability_ == Durability::kPowerLoss) return commit_file(temporary, path);
   fs::rename(temporary, path, error);
-  if (!error) return absl::OkStatus();
-  return absl::UnavailableError("cannot rename " + temporary.string() + ": " + error.message());
+  return error ? failed(temporary, "rename", error.value()) : absl::OkStatus();
 }
 
 absl::StatusOr<Digest> BlobStore::put(std::span<const uint8_t> bytes) {

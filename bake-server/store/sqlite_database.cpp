@@ -20,6 +20,7 @@ struct Database::Impl {
   std::filesystem::path file;
   sqlite3* connection = nullptr;
   bool transaction = false;                                  // one has begun, whether or not SQLite still has it
+  absl::Status undone;                                       // the error by which SQLite ended it
   std::map<std::string_view, PreparedStatement> statements;  // by their SQL; std::map keeps addresses
 };
 
@@ -135,6 +136,14 @@ absl::StatusOr<int64_t> Database::finish(Query& statement) {
 }
 
 absl::Status Database::error(int code) const {
+  absl::Status status = in_words(code);
+  if (impl_->transaction && impl_->undone.ok() && sqlite3_get_autocommit(impl_->connection) != 0) {
+    impl_->undone = status;
+  }
+  return status;
+}
+
+absl::Status Database::in_words(int code) const {
   const std::string file = impl_->file.string();
   const std::string folder = impl_->file.parent_path().string();
   const std::string reason = impl_->connection == nullptr ? sqlite3_errstr(code) : sqlite3_errmsg(impl_->connection);
@@ -142,7 +151,9 @@ absl::Status Database::error(int code) const {
   const int kind = code & 0xFF;  // extended codes hold the plain one in their low byte
 
   const bool no_space = system_error == ENOSPC || system_error == EDQUOT || system_error == EFBIG;
-  if (kind == SQLITE_FULL || (kind == SQLITE_IOERR && no_space)) {
+  // SQLite does not say why it could not make a file: it then tried to read it, and says why that failed.
+  const bool no_file = kind == SQLITE_CANTOPEN && absl::IsResourceExhausted(check_writable(impl_->file));
+  if (kind == SQLITE_FULL || (kind == SQLITE_IOERR && no_space) || no_file) {
     return absl::ResourceExhaustedError(
         absl::StrCat("no space left for the farm's state in ", folder, " (", reason, "): free some on that disk"));
   }
@@ -178,21 +189,24 @@ absl::Status Transaction::begin() {
   Database::Impl& impl = *database_.impl_;
   const bool inner = impl.transaction;
   // Some errors end a transaction: what comes after them must not be committed by itself.
-  if (inner && sqlite3_get_autocommit(impl.connection) != 0) {
-    return absl::AbortedError(impl.file.string() + ": an earlier error has undone this change; try again");
-  }
+  if (inner && sqlite3_get_autocommit(impl.connection) != 0) return undone();
   // IMMEDIATE: what the transaction reads must not change before it writes.
   LL_RETURN_IF_ERROR(database_.run(inner ? "SAVEPOINT inner" : "BEGIN IMMEDIATE").status());
   state_ = inner ? State::kInner : State::kOuter;
   impl.transaction = true;
+  if (!inner) impl.undone = absl::OkStatus();
   return absl::OkStatus();
+}
+
+absl::Status Transaction::undone() const {
+  const Database::Impl& impl = *database_.impl_;
+  if (!impl.undone.ok()) return impl.undone;
+  return absl::AbortedError(impl.file.string() + ": an earlier error has undone this change; try again");
 }
 
 absl::Status Transaction::commit() {
   Database::Impl& impl = *database_.impl_;
-  if (sqlite3_get_autocommit(impl.connection) != 0) {
-    return absl::AbortedError(impl.file.string() + ": an earlier error has undone this change; try again");
-  }
+  if (sqlite3_get_autocommit(impl.connection) != 0) return undone();
   LL_RETURN_IF_ERROR(database_.run(state_ == State::kInner ? "RELEASE inner" : "COMMIT").status());
   if (state_ == State::kOuter) impl.transaction = false;
   state_ = State::kClosed;

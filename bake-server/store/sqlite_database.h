@@ -83,6 +83,7 @@ class Database {
   Query prepare(const char* sql);
   absl::StatusOr<int64_t> finish(Query& statement);
   absl::Status error(int code) const;
+  absl::Status in_words(int code) const;
 
   std::unique_ptr<Impl> impl_;
 };
@@ -95,10 +96,13 @@ class Transaction {
   Transaction(const Transaction&) = delete;
   Transaction& operator=(const Transaction&) = delete;
 
+  /// Both: the error, if any, by which SQLite ended the transaction before.
   absl::Status begin();
   absl::Status commit();
 
  private:
+  absl::Status undone() const;
+
   Database& database_;
   enum class State { kClosed, kOuter, kInner } state_ = State::kClosed;  // kClosed: never begun, or committed
 };

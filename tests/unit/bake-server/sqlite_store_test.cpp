@@ -183,6 +183,11 @@ TEST_F(SqliteStoreTest, AFullDiskChangesNothingAndPasses) {
   EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted) << status;
   EXPECT_THAT(std::string(status.message()), HasSubstr(folder_.path().string()));
   EXPECT_THAT(std::string(status.message()), Not(HasSubstr("\n")));
+  const absl::Status of_group = store->group([&] {
+    (void)store->submit(new_job("s", tasks), 2);
+    return absl::OkStatus();
+  });
+  EXPECT_EQ(of_group.code(), absl::StatusCode::kResourceExhausted) << of_group;
   EXPECT_EQ(value(store->jobs(0, 10)).size(), 1u);
   EXPECT_TRUE(value(store->lease({1, "w", "t", 100, 1}, 10))) << "small changes still fit";
 
