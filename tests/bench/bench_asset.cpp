@@ -9,19 +9,11 @@
 
 #include "core/asset/asset.h"
 #include "core/base/file.h"
+#include "tests/bench/or_exit.h"
 #include "tests/unit/runtime/synthetic_asset.h"
 
 namespace lightloom::bench {
 namespace {
-
-template <class T>
-T or_exit(absl::StatusOr<T> value) {
-  if (!value.ok()) {
-    std::fprintf(stderr, "%s\n", value.status().ToString().c_str());
-    std::exit(1);
-  }
-  return *std::move(value);
-}
 
 absl::Status copy_chunk(std::span<const uint8_t> bytes, std::span<uint8_t> out) {
   if (bytes.size() != out.size()) return absl::DataLossError("a chunk has another size than the manifest says");

@@ -1,7 +1,6 @@
 // Milliseconds and bytes of each pass of the SIMD runtime, beside a bare matrix–vector loop over as many bytes in the
 // same run; and what a frame costs when only a part of the light changes.
 #include <gtest/gtest.h>
-#include <time.h>
 
 #include <cstdio>
 #include <vector>
@@ -9,6 +8,7 @@
 #include "core/base/half.h"
 #include "tests/bench/bare_loops.h"
 #include "tests/bench/bench_asset.h"
+#include "tests/bench/cpu_time.h"
 #include "tests/unit/runtime/simd/simd_level.h"
 #include "tests/unit/runtime/synthetic_asset.h"
 
@@ -17,12 +17,7 @@ namespace {
 
 constexpr int kRepeats = 9;
 
-/// Of this thread: others on the machine must not count.
-double cpu_milliseconds() {
-  timespec t;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
-}
+using bench::cpu_milliseconds;
 
 /// A matrix of `bytes`, and what multiplying with it takes.
 class BareMatrix {

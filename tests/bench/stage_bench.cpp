@@ -8,18 +8,14 @@
 #include "core/bake/task_runner.h"
 #include "core/base/file.h"
 #include "core/base/stopwatch.h"
+#include "tests/bench/or_exit.h"
 
 namespace lightloom {
 namespace {
 
 constexpr int64_t kRun = 16;  // neighbours that one process takes, as DecideOptions::run
 
-template <class T>
-T or_exit(absl::StatusOr<T> value) {
-  if (value.ok()) return *std::move(value);
-  std::fprintf(stderr, "%s\n", std::string(value.status().message()).c_str());
-  std::exit(1);
-}
+using bench::or_exit;
 
 /// One thread's.
 class MemoryBlobs final : public BlobAccess {
