@@ -9,6 +9,7 @@
 #include <cstring>
 #include <string>
 
+#include "core/base/check.h"
 #include "core/base/half.h"
 #include "core/base/sh.h"
 #include "core/baselines/ddgi_grid.h"
@@ -22,29 +23,58 @@ using IrradianceMap = OctahedralMap<6>;
 using Rgba [[gnu::vector_size(16)]] = float;
 
 constexpr uint32_t kOff = 0xffffffffu;
-constexpr size_t kSide = 6, kStride = 40;  // texels of the map within its border, and these rounded up to 8
+constexpr size_t kSide = 6, kTexels = kSide * kSide;  // of the map within its border
 
 // Stored (2019, Sec. "Implementation"): irradiance R11G11B10F, both distances RG16F; 2021 adds offset and state, RGBA16F.
 constexpr uint64_t kIrradianceBytes = IrradianceMap::kTexels * 4, kDistanceBytes = DistanceMap::kTexels * 4,
                    kStateBytes = 8;
 
-/// N × kStride: cos⁺(ω_r, texel) ÷ Σ_r cos⁺, so that the rays' radiance becomes irradiance ÷ π, and a uniform field is
-/// exact.
-std::vector<float> cosine_weights(uint32_t rays) {
-  std::vector<float> weights(rays * kStride);
-  for (size_t t = 0; t < kSide * kSide; ++t) {
-    const Vec3 texel = IrradianceMap::direction(t % kSide, t / kSide);
-    double sum = 0;
-    for (uint32_t r = 0; r < rays; ++r) {
-      const float cosine = std::max(0.0f, dot(texel, sphere_direction(r, rays)));
-      weights[r * kStride + t] = cosine;
-      sum += static_cast<double>(cosine);
+/// From the rays' radiance to irradiance ÷ π per texel t: Σ_r cos⁺(ω_r, t)·L_r ÷ Σ_r cos⁺, so that a uniform field is exact.
+/// Since cos⁺ = (cos + |cos|)/2, cos is linear in the texel's direction and |cos| that of the opposite texel too, 36 texels
+/// take 21 columns.
+class CosineFilter {
+ public:
+  static constexpr size_t kStride = 24;  // columns, rounded up to 8
+
+  explicit CosineFilter(uint32_t rays) : weights_(rays * kStride) {
+    size_t columns = 0;
+    for (size_t t = 0; t < kTexels; ++t) {
+      directions_[t] = IrradianceMap::direction(t % kSide, t / kSide);
+      size_t opposite = 0;
+      while (opposite < t && dot(directions_[opposite], directions_[t]) > -0.999f) ++opposite;
+      columns_[t] = opposite < t ? columns_[opposite] : columns++;
     }
-    if (!(sum > 0)) continue;
-    for (uint32_t r = 0; r < rays; ++r) weights[r * kStride + t] *= static_cast<float>(1 / sum);
+    LL_CHECK(columns == kLinear);
+    std::array<double, kTexels> sums{};
+    for (uint32_t r = 0; r < rays; ++r) {
+      const Vec3 ray = sphere_direction(r, rays);
+      float* row = weights_.data() + r * kStride;
+      for (size_t t = 0; t < kTexels; ++t) {
+        const float cosine = dot(directions_[t], ray);
+        row[columns_[t]] = 0.5f * std::abs(cosine);
+        sums[t] += static_cast<double>(std::max(cosine, 0.0f));
+      }
+      for (int a = 0; a < 3; ++a) row[kLinear + static_cast<size_t>(a)] = 0.5f * ray[a];
+    }
+    for (size_t t = 0; t < kTexels; ++t) scales_[t] = sums[t] > 0 ? static_cast<float>(1 / sums[t]) : 0;
   }
-  return weights;
-}
+
+  /// For RelightRays::project().
+  std::span<const float> weights() const { return weights_; }
+  /// Texel t of one colour, from the columns of that colour.
+  float texel(size_t t, const float* columns) const {
+    const Vec3 linear{columns[kLinear], columns[kLinear + 1], columns[kLinear + 2]};
+    return std::max(0.0f, scales_[t] * (columns[columns_[t]] + dot(directions_[t], linear)));
+  }
+
+ private:
+  static constexpr size_t kLinear = kTexels / 2;  // the first of three columns
+
+  std::vector<float> weights_;  ///< rays × kStride
+  std::array<Vec3, kTexels> directions_;
+  std::array<size_t, kTexels> columns_{};
+  std::array<float, kTexels> scales_{};
+};
 
 class Ddgi final : public Baseline {
  public:
@@ -65,7 +95,7 @@ class Ddgi final : public Baseline {
         queries_(std::move(queries)),
         corners_(probes_.grid.corners()),
         bias_(params.bias * least(probes_.grid.spacing)),
-        cosines_(cosine_weights(this->rays().count())) {
+        filter_(this->rays().count()) {
     if (!params_.keep_weights) return;
     kept_weights_.resize(queries_.size());
     Parallel how;
@@ -132,15 +162,15 @@ class Ddgi final : public Baseline {
   }
 
   void relight(uint32_t probe, std::span<const Vec3> radiance, std::span<float> kept) const override {
-    std::array<float, 3 * kStride> texels;
-    rays().project(probe, radiance, cosines_, kStride, texels);
-    if (params_.perceptual) {
-      for (float& t : texels) t = std::pow(std::max(t, 0.0f), 0.2f);
-    }
+    std::array<float, 3 * CosineFilter::kStride> columns;
+    rays().project(probe, radiance, filter_.weights(), CosineFilter::kStride, columns);
     std::array<Rgba, IrradianceMap::kTexels> map{};
-    for (size_t t = 0; t < kSide * kSide; ++t) {
-      map[IrradianceMap::index(t % kSide, t / kSide)] =
-          Rgba{texels[t], texels[kStride + t], texels[2 * kStride + t], 0};
+    for (size_t t = 0; t < kTexels; ++t) {
+      Rgba& texel = map[IrradianceMap::index(t % kSide, t / kSide)];
+      for (size_t c = 0; c < 3; ++c) {
+        const float e = filter_.texel(t, columns.data() + c * CosineFilter::kStride);
+        texel[c] = params_.perceptual ? std::pow(e, 0.2f) : e;
+      }
     }
     IrradianceMap::fill_border<Rgba>(map);
     std::memcpy(kept.data(), map.data(), sizeof map);
@@ -174,7 +204,7 @@ class Ddgi final : public Baseline {
   std::vector<Query> queries_;
   std::array<uint32_t, 8> corners_;
   float bias_;  ///< metres
-  std::vector<float> cosines_;
+  CosineFilter filter_;
   std::vector<Cage> kept_weights_;
 };
 
