@@ -1,6 +1,6 @@
 // Majercik, Guertin, Nowrouzezahrai, McGuire, "Dynamic Diffuse Global Illumination with Ray-Traced Irradiance Fields",
 // JCGT 8(2), 2019; Majercik, Marrs, Spjut, McGuire, "Scaling Probe-Based Real-Time Dynamic Global Illumination for
-// Production", JCGT 10(2), 2021. Constants as in the authors' RTXGI-DDGI SDK 1.2 (Irradiance, ProbeBlendingCS).
+// Production", JCGT 10(2), 2021. Constants as in the authors' RTXGI-DDGI SDK (Irradiance, ProbeBlendingCS).
 #include "core/baselines/ddgi.h"
 
 #include <algorithm>
@@ -25,7 +25,7 @@ using Rgba [[gnu::vector_size(16)]] = float;
 constexpr uint32_t kOff = 0xffffffffu;
 constexpr size_t kSide = 6, kTexels = kSide * kSide;  // of the map within its border
 
-// Stored (2019, Sec. "Implementation"): irradiance R11G11B10F, both distances RG16F; 2021 adds offset and state, RGBA16F.
+// As 2019 stores them: irradiance R11G11B10F, both distances RG16F; and the SDK's offset and state, RGBA16F.
 constexpr uint64_t kIrradianceBytes = IrradianceMap::kTexels * 4, kDistanceBytes = DistanceMap::kTexels * 4,
                    kStateBytes = 8;
 

@@ -1,5 +1,5 @@
 // Visibility-weighted irradiance probes: dynamic diffuse global illumination (Majercik et al. 2019 and 2021), in the form
-// that NVIDIA's RTXGI-DDGI SDK 1.2 gives it.
+// that NVIDIA's RTXGI-DDGI SDK gives it.
 //
 // What differs from a game: rays are the same in every frame and many, so there is no hysteresis to blend them in time;
 // distances are geometry, filtered once; a lightmap has no view, so receivers are biased along their normals alone.

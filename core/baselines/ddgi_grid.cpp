@@ -1,5 +1,5 @@
 // Majercik, Marrs, Spjut, McGuire, "Scaling Probe-Based Real-Time Dynamic Global Illumination for Production", JCGT
-// 10(2), 2021 (probe position adjustment, probe states); constants as in the authors' RTXGI-DDGI SDK 1.2
+// 10(2), 2021 (probe position adjustment, probe states); constants as in the authors' RTXGI-DDGI SDK
 // (ProbeRelocationCS, ProbeClassificationCS).
 #include "core/baselines/ddgi_grid.h"
 

@@ -1,6 +1,6 @@
 // Majercik, Guertin, Nowrouzezahrai, McGuire, "Dynamic Diffuse Global Illumination with Ray-Traced Irradiance Fields",
 // JCGT 8(2), 2019, after Donnelly & Lauritzen, "Variance Shadow Maps", 2006; constants as in the authors' RTXGI-DDGI SDK
-// 1.2 (ProbeBlendingCS, Irradiance).
+// (ProbeBlendingCS, Irradiance).
 #include "core/baselines/ddgi_visibility.h"
 
 #include <algorithm>
