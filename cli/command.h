@@ -10,6 +10,7 @@ inline constexpr int kMaxThreads = 1024;
 Command bake_command();
 Command cancel_command();
 Command compare_command();
+Command eval_command();
 Command events_command();
 Command fetch_command();
 Command inspect_command();

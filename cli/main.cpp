@@ -28,9 +28,9 @@ int run(int argc, char** argv) {
                  .help = "lightloom: bakes the light of a level so that it can be relit in real time"},
       .version = std::string(kVersion) + ", method " + std::string(kMethodVersion),
       .commands = {bake_command(), inspect_command(), verify_command(), render_command(), view_command(),
-                   reference_command(), compare_command(), make_scene_command(), submit_command(), watch_command(),
-                   list_command(), cancel_command(), fetch_command(), set_priority_command(), workers_command(),
-                   events_command()}};
+                   reference_command(), compare_command(), eval_command(), make_scene_command(), submit_command(),
+                   watch_command(), list_command(), cancel_command(), fetch_command(), set_priority_command(),
+                   workers_command(), events_command()}};
   const Parsed parsed = parse_command_line(program, argc, argv);
   if (!parsed.command) return parsed.exit_code;
   const absl::Status status = parsed.command->run();
