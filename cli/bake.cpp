@@ -20,6 +20,7 @@
 #include "cli/local_bake.h"
 #include "cli/outlook.h"
 #include "cli/print_json.h"
+#include "cli/print_tuning.h"
 #include "cli/progress.h"
 #include "core/bake/bake.h"
 #include "core/base/stopwatch.h"
@@ -161,20 +162,25 @@ absl::Status check(Options* o) {
   return OutputCheck({o->scene}).loom("-o", o->output);
 }
 
-absl::Status run_on_farm(const Options& o, const BakeParams& params, const EarlierBake* earlier) {
+absl::Status run_on_farm(const Options& o, const BakeParams& params, const EarlierBake* earlier,
+                         const std::optional<Tuning>& tuning) {
   FarmClient farm = o.farm.connect();
   LL_ASSIGN_OR_RETURN(const FarmBake baked, farm_bake(&farm, o.farm.server, o.scene, params, earlier, o.output));
   if (o.farm.json) {
-    print_json(to_json(baked));
+    nlohmann::json out = to_json(baked);
+    if (tuning) out["tuning"] = to_json(*tuning);
+    print_json(out);
   } else {
     print(o.output, baked);
   }
   return absl::OkStatus();
 }
 
-absl::Status print_report(const Options& o, const BakeReport& report) {
+absl::Status print_report(const Options& o, const BakeReport& report, const std::optional<Tuning>& tuning) {
   if (o.farm.json) {
-    print_json(to_json(report));
+    nlohmann::json out = to_json(report);
+    if (tuning) out["tuning"] = to_json(*tuning);
+    print_json(out);
   } else {
     print(o.output, report);
   }
@@ -187,7 +193,19 @@ absl::Status run(const Options& o) {
   LL_ASSIGN_OR_RETURN(const Level level, load_level(o.scene));
   std::optional<EarlierBake> earlier;
   if (!o.fresh) earlier = find_earlier_bake(o.output);
-  const BakeParams params = o.how.params(earlier ? &earlier->manifest.params : nullptr);
+  ProgressBar bar;
+  if (o.progress) bar.print_lines();
+  BakeControl control;
+  control.threads = o.threads;
+  control.cancel = &interrupted();
+  control.progress = [&](const std::string& stage, uint64_t done, uint64_t total, uint64_t rays) {
+    bar.update(stage, done, total, rays);
+  };
+  std::optional<Tuning> tuning;
+  LL_ASSIGN_OR_RETURN(const BakeParams params,
+                      o.how.tuned(*level.tracer, earlier ? &earlier->manifest.params : nullptr, control, &tuning));
+  bar.finish();
+  if (tuning && !o.farm.json) print(*tuning);
   std::string anew;
   if (earlier) {
     earlier->tolerance = static_cast<double>(o.tolerance);
@@ -205,18 +223,10 @@ absl::Status run(const Options& o) {
     report.probes_reused = report.probes;
     report.rays_gather_reused = report.rays_gather;
     report.seconds_total = watch.seconds();
-    return print_report(o, report);
+    return print_report(o, report, tuning);
   }
-  if (!o.farm.server.empty()) return run_on_farm(o, params, earlier ? &*earlier : nullptr);
+  if (!o.farm.server.empty()) return run_on_farm(o, params, earlier ? &*earlier : nullptr, tuning);
 
-  ProgressBar bar;
-  if (o.progress) bar.print_lines();
-  BakeControl control;
-  control.threads = o.threads;
-  control.cancel = &interrupted();
-  control.progress = [&](const std::string& stage, uint64_t done, uint64_t total, uint64_t rays) {
-    bar.update(stage, done, total, rays);
-  };
   LocalBake bake{params, o.output, earlier ? &*earlier : nullptr, nullptr};
   bake.planned = [&](const BakeSession& session, const Reuse& reuse) {
     if (!o.explain && !o.dry_run) return true;
@@ -231,7 +241,7 @@ absl::Status run(const Options& o) {
   };
   LL_ASSIGN_OR_RETURN(const BakeReport report, local_bake(*level.tracer, bake, control));
   bar.finish();
-  return o.dry_run ? absl::OkStatus() : print_report(o, report);
+  return o.dry_run ? absl::OkStatus() : print_report(o, report, tuning);
 }
 
 }  // namespace

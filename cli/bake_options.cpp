@@ -1,9 +1,21 @@
 #include "cli/bake_options.h"
 
 namespace lightloom {
+namespace {
+
+constexpr float kDefaultError = 0.05f;
+
+}  // namespace
 
 std::vector<Option> BakeOptions::options() {
-  return {{"--method", "default, or sl17: Silvennoinen & Lehtinen 2017 as published, to compare with", &method_},
+  return {{"--error",
+           "relative error (RMS, one bounce) for which the cheapest model is chosen, unless it is given by the options "
+           "below [0.05]",
+           &error_},
+          {"--budget", "of the asset, like 32MB: the most accurate model that it holds; 0: none, --error counts",
+           SizeOption{&budget_}},
+          {"--retune", "choose anew, whatever the parameters of OUT.loom are", &retune_},
+          {"--method", "default, or sl17: Silvennoinen & Lehtinen 2017 as published, to compare with", &method_},
           {"--spacing", "side of a probe cell, metres [0: chosen from the level]", &spacing_},
           {"--order", "spherical harmonics order of the probes, 0 to 9 [7]", &order_},
           {"--probes", "sl17: how many, instead of by --spacing [0: by --spacing]", &probes_},
@@ -16,6 +28,36 @@ std::vector<Option> BakeOptions::options() {
           {"--texels-per-metre", "lightmap density [0: chosen from the level]", &texels_per_metre_},
           {"--lightmap-size", "side of the scene atlas, texels [0: from the density]", &lightmap_size_},
           {"--seed", "of all random numbers [0]", &seed_}};
+}
+
+std::string BakeOptions::fixed() const {
+  if (method_ == "sl17") return "--method sl17";
+  if (spacing_) return "--spacing";
+  if (order_) return "--order";
+  if (probes_) return "--probes";
+  if (links_) return "--links";
+  if (rays_) return "--rays";
+  if (relight_rays_) return "--relight-rays";
+  if (max_rank_) return "--max-rank";
+  return threshold_ ? "--threshold" : "";
+}
+
+std::optional<TuneTarget> BakeOptions::target(const BakeParams* earlier) const {
+  if ((earlier != nullptr && !retune_) || !fixed().empty()) return std::nullopt;
+  if (budget_ > 0) return TuneTarget{0, budget_};
+  return TuneTarget{static_cast<double>(error_.value_or(kDefaultError)), 0};
+}
+
+absl::StatusOr<BakeParams> BakeOptions::tuned(const RayTracer& tracer, const BakeParams* earlier,
+                                              const BakeControl& control, std::optional<Tuning>* tuning) const {
+  BakeParams p = params(earlier);
+  const std::optional<TuneTarget> for_what = target(earlier);
+  if (!for_what) return p;
+  p.spacing = 0;
+  LL_ASSIGN_OR_RETURN(const Tuning chosen, tune(tracer, p, *for_what, control));
+  p = chosen.chosen.params;
+  if (tuning != nullptr) *tuning = chosen;
+  return p;
 }
 
 BakeParams BakeOptions::params(const BakeParams* earlier) const {
@@ -47,6 +89,16 @@ BakeParams BakeOptions::params(const BakeParams* earlier) const {
 absl::Status BakeOptions::check() const {
   if (!method_.empty() && method_ != "default" && method_ != "sl17") {
     return absl::InvalidArgumentError("--method must be default or sl17");
+  }
+  if (error_ && !(*error_ > 0 && *error_ <= 1)) {
+    return absl::InvalidArgumentError("--error must be above 0, and 1 at most");
+  }
+  if (error_ && budget_ > 0) return absl::InvalidArgumentError("--error and --budget: give one of them");
+  if ((error_ || budget_ > 0 || retune_) && !fixed().empty()) {
+    return absl::InvalidArgumentError(std::string(error_        ? "--error"
+                                                  : budget_ > 0 ? "--budget"
+                                                                : "--retune") +
+                                      " chooses what " + fixed() + " gives: leave out one of them");
   }
   return check_params(params(nullptr));
 }

@@ -12,6 +12,7 @@
 #include "cli/interrupt.h"
 #include "cli/level.h"
 #include "cli/print_json.h"
+#include "cli/progress.h"
 
 namespace lightloom {
 namespace {
@@ -40,9 +41,17 @@ absl::Status run(const Options& o) {
           "; leave out --from");
     }
   }
-  LL_RETURN_IF_ERROR(load_level(o.scene).status());
+  LL_ASSIGN_OR_RETURN(const Level level, load_level(o.scene));
+  ProgressBar bar;
+  BakeControl control;
+  control.cancel = &interrupted();
+  control.progress = [&](const std::string& stage, uint64_t done, uint64_t total, uint64_t rays) {
+    bar.update(stage, done, total, rays);
+  };
+  LL_ASSIGN_OR_RETURN(const BakeParams params,
+                      o.how.tuned(*level.tracer, earlier ? &earlier->manifest.params : nullptr, control, nullptr));
+  bar.finish();
   FarmClient farm = o.farm->connect();
-  const BakeParams params = o.how.params(earlier ? &earlier->manifest.params : nullptr);
   LL_ASSIGN_OR_RETURN(const RemoteJob job,
                       submit_level(&farm, o.scene, params, earlier ? &*earlier : nullptr, o.name, o.priority));
   if (o.farm->json) {

@@ -9,6 +9,7 @@
 #include "core/bake/bake.h"
 #include "core/base/stopwatch.h"
 #include "core/relight/lightmap.h"
+#include "core/tuning/tune.h"
 
 namespace lightloom::eval {
 namespace {
@@ -16,9 +17,13 @@ namespace {
 class LoomModel : public Model {
  public:
   static absl::StatusOr<std::unique_ptr<Model>> create(LitLevel* level, const BakeParams& params,
-                                                       const std::filesystem::path& loom) {
+                                                       const std::filesystem::path& loom, double tuning_seconds = 0,
+                                                       double tuning_core_seconds = 0) {
     auto model = std::make_unique<LoomModel>(level);
     LL_RETURN_IF_ERROR(model->bake_and_load(params, loom));
+    model->facts_.seconds += tuning_seconds;
+    model->facts_.core_seconds += tuning_core_seconds;
+    if (tuning_seconds > 0) model->facts_.stages["tuning"] = tuning_seconds;
     return model;
   }
   explicit LoomModel(LitLevel* level) : level_(*level) {}
@@ -103,12 +108,14 @@ std::string with(const std::string& label, const std::string& more) {
   return label.empty() ? more : label + ", " + more;
 }
 
-std::string times(double factor) {
-  std::string text = std::to_string(factor);
+std::string plain(double number) {
+  std::string text = std::to_string(number);
   text.erase(text.find_last_not_of('0') + 1);
   if (text.back() == '.') text.pop_back();
-  return "×" + text;
+  return text;
 }
+
+std::string times(double factor) { return "×" + plain(factor); }
 
 class LoomMethod : public Method {
  public:
@@ -194,8 +201,39 @@ class LoomMethod : public Method {
   BakeMethod method_;
 };
 
+class TunedMethod : public Method {
+ public:
+  std::string name() const override { return "tuned"; }
+  std::string title() const override { return "lightloom --error"; }
+  std::string about() const override {
+    return "lightloom bake --error E: spacing, order, rays and rank chosen for a target, by lights of the level's own "
+           "space. Its seconds include the choice.";
+  }
+  std::vector<Variant> sweep(const LitLevel&, bool quick) const override {
+    std::vector<Variant> out;
+    for (const double error :
+         quick ? std::vector<double>{0.05, 0.1} : std::vector<double>{0.05, 0.035, 0.07, 0.1, 0.14, 0.2}) {
+      out.push_back({with("", "error " + plain(error)), {{"error", error}}});
+    }
+    return out;
+  }
+  absl::StatusOr<std::unique_ptr<Model>> prepare(LitLevel* level, const Settings& settings,
+                                                 const std::filesystem::path& scratch) const override {
+    BakeControl control;
+    control.threads = level->threads();
+    control.cancel = &interrupted();
+    const double before = processor_seconds();
+    BakeParams request = level->plan().params;
+    request.spacing = 0;
+    LL_ASSIGN_OR_RETURN(const Tuning tuning, tune(level->tracer(), request, {settings.at("error"), 0}, control));
+    return LoomModel::create(level, tuning.chosen.params, scratch / "level.loom", tuning.seconds,
+                             processor_seconds() - before);
+  }
+};
+
 }  // namespace
 
+std::unique_ptr<Method> tuned_method() { return std::make_unique<TunedMethod>(); }
 std::unique_ptr<Method> loom_method(BakeMethod method) { return std::make_unique<LoomMethod>(method); }
 
 }  // namespace lightloom::eval

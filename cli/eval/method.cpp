@@ -8,6 +8,7 @@ const std::vector<std::unique_ptr<Method>>& all_methods() {
   static const auto* methods = [] {
     auto* all = new std::vector<std::unique_ptr<Method>>;
     all->push_back(loom_method(BakeMethod::kDefault));
+    all->push_back(tuned_method());
     all->push_back(loom_method(BakeMethod::kSl17));
     all->push_back(static_lightmap_method());
     return all;

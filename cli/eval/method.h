@@ -59,6 +59,7 @@ const std::vector<std::unique_ptr<Method>>& all_methods();
 
 // One maker each, in files of their own.
 std::unique_ptr<Method> loom_method(BakeMethod method);
+std::unique_ptr<Method> tuned_method();
 std::unique_ptr<Method> static_lightmap_method();
 
 /// Processor seconds of this process so far, all threads.

@@ -127,13 +127,17 @@ absl::Status check_params(const BakeParams& p) {
 }
 
 absl::StatusOr<Plan> make_plan(const RayTracer& tracer, const BakeParams& request, const BakeControl& control) {
+  LL_ASSIGN_OR_RETURN(Plan ground, find_ground(tracer, request, control));
+  return finish_plan(tracer, std::move(ground), control);
+}
+
+absl::StatusOr<Plan> find_ground(const RayTracer& tracer, const BakeParams& request, const BakeControl& control) {
   LL_RETURN_IF_ERROR(check_params(request));
   const Scene& scene = tracer.scene();
   Plan plan;
   plan.params = request;
 
   // Choose what the request leaves open, and record it.
-  const bool sl17 = request.method == BakeMethod::kSl17;
   plan.params.rays = static_cast<int32_t>(well_stratified(static_cast<uint32_t>(request.rays)));
   if (plan.params.spacing == 0) plan.params.spacing = default_spacing(scene.bounds());
   LL_RETURN_IF_ERROR(check_spacing(plan.params.spacing, scene.bounds()));
@@ -153,8 +157,14 @@ absl::StatusOr<Plan> make_plan(const RayTracer& tracer, const BakeParams& reques
         "no lightmap texel lies in open space: give the level static objects that receive a lightmap, and check that "
         "its normals do not all point into solids");
   }
+  return plan;
+}
+
+absl::StatusOr<Plan> finish_plan(const RayTracer& tracer, Plan plan, const BakeControl& control) {
+  const Scene& scene = tracer.scene();
+  LL_RETURN_IF_ERROR(check_spacing(plan.params.spacing, scene.bounds()));
   const Stopwatch probes_watch;
-  if (sl17) {
+  if (plan.params.method == BakeMethod::kSl17) {
     const Sl17Options placement{plan.params.spacing, plan.params.probes, plan.params.links};
     LL_ASSIGN_OR_RETURN(plan.placement, place_probes_sl17(tracer, &plan.receivers, placement, control.stage("probes")));
   } else {

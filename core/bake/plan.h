@@ -55,6 +55,11 @@ absl::Status check_params(const BakeParams& request);
 /// Errors: parameters out of range, a scene without receivers, cancellation.
 absl::StatusOr<Plan> make_plan(const RayTracer& tracer, const BakeParams& request, const BakeControl& control);
 
+/// The first half of make_plan: a plan with receivers, and neither probes nor cells. Its spacing may be changed.
+absl::StatusOr<Plan> find_ground(const RayTracer& tracer, const BakeParams& request, const BakeControl& control);
+/// The other half.
+absl::StatusOr<Plan> finish_plan(const RayTracer& tracer, Plan ground, const BakeControl& control);
+
 /// Everything in the scene that the transport depends on: geometry, alpha masks, sidedness, what receives; not
 /// albedo, emission or lights.
 Digest scene_hash(const Scene& scene);

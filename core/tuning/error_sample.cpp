@@ -1,0 +1,243 @@
+#include "core/tuning/error_sample.h"
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+
+#include "core/bake/tasks.h"
+#include "core/transport/gather.h"
+
+namespace lightloom {
+namespace {
+
+constexpr int kLights = 16;
+constexpr uint32_t kBatches = 4, kBatchRays = 128;  // their spread tells the noise, which is not the model's
+constexpr uint32_t kRelightRays = 1024, kOtherRelightRays = 987;  // two lattices, so that their difference is noise
+constexpr size_t kLeastReceivers = 512, kMostReceivers = 1024, kShare = 32;
+
+using RowMatrix = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+absl::Status cancelled() { return absl::CancelledError("cancelled while choosing parameters"); }
+
+uint64_t batch_seed(uint64_t seed, uint32_t batch) { return hash_combine(seed, 0x7a3e + batch); }
+
+/// Mean over lights of √(error² ÷ energy): what is estimated without bias may come out below zero for one of them.
+double relative(const std::vector<double>& error2, const std::vector<double>& energy) {
+  double sum = 0;
+  size_t lit = 0;
+  for (size_t l = 0; l < energy.size(); ++l) {
+    if (!(energy[l] > 0)) continue;
+    sum += std::sqrt(std::max(0.0, error2[l] / energy[l]));
+    ++lit;
+  }
+  return lit > 0 ? sum / static_cast<double>(lit) : 0;
+}
+
+PlannedCell alone(uint32_t receiver) {
+  PlannedCell cell;
+  cell.receivers = {receiver};
+  return cell;
+}
+
+}  // namespace
+
+ErrorSample::ErrorSample(const RayTracer& tracer, const Plan& ground)
+    : tracer_(tracer), ground_(ground), search_(tracer.scene(), ground.layout, ground.receivers) {}
+
+absl::StatusOr<std::unique_ptr<ErrorSample>> ErrorSample::create(const RayTracer& tracer, const Plan& ground,
+                                                                 const Parallel& how) {
+  std::unique_ptr<ErrorSample> out(new ErrorSample(tracer, ground));
+  LL_ASSIGN_OR_RETURN(out->lights_, SampleLights::create(tracer, ground, kLights, how));
+
+  std::vector<uint32_t> fronts;
+  for (uint32_t i = 0; i < ground.receivers.all.size(); ++i) {
+    if (!ground.receivers.all[i].back) fronts.push_back(i);
+  }
+  if (fronts.empty()) {
+    for (uint32_t i = 0; i < ground.receivers.all.size(); ++i) fronts.push_back(i);
+  }
+  const size_t wanted = std::clamp(fronts.size() / kShare, kLeastReceivers, kMostReceivers);
+  const size_t count = std::min(wanted, fronts.size());
+  for (size_t i = 0; i < count; ++i) {  // one of each stretch: neighbours have neighbouring numbers
+    const size_t first = i * fronts.size() / count, end = (i + 1) * fronts.size() / count;
+    Rng rng(hash_combine(0x7a3e, i));
+    out->receivers_.push_back(fronts[first + rng.next_below(static_cast<uint32_t>(end - first))]);
+  }
+
+  const size_t lights = out->lights_.count();
+  out->truth_.assign(count * kBatches * lights, 0);
+  const Scene& scene = tracer.scene();
+  const bool done = parallel_for(count, how, [&](uint64_t i) {
+    // Rays start where a bake's do: the task of the receiver knows.
+    const Plan& plan = ground;
+    const Receiver& r = plan.receivers.all[out->receivers_[i]];
+    GatherPoint point = make_cell_task(plan, scene, alone(out->receivers_[i])).receivers.front();
+    for (uint32_t b = 0; b < kBatches; ++b) {
+      float* e = &out->truth_[(i * kBatches + b) * lights];
+      Rng rng(batch_seed(r.seed, b));
+      const Strata strata = strata_of(kBatchRays);
+      for (uint32_t k = 0; k < kBatchRays; ++k) {
+        const GatherRay ray = gather_ray(point, k, strata, &rng);
+        const Hit hit = tracer.closest(ray.origin, ray.direction);
+        if (!hit) continue;
+        const Object& object = scene.objects[hit.object];
+        if (hit.back && !scene.materials[object.triangles[hit.triangle].material].double_sided) continue;
+        const uint32_t texel = out->search_.locate(hit);
+        if (texel == Receivers::kNone) continue;
+        const auto radiance = out->lights_.radiance(texel);
+        for (size_t l = 0; l < lights; ++l) e[l] += kPi / kBatchRays * radiance[l];
+      }
+    }
+  });
+  if (!done) return cancelled();
+  out->energy_.assign(lights, 0);
+  for (size_t i = 0; i < count; ++i) {
+    for (size_t l = 0; l < lights; ++l) {
+      double mean = 0;
+      for (uint32_t b = 0; b < kBatches; ++b) {
+        mean += static_cast<double>(out->truth_[(i * kBatches + b) * lights + l]) / kBatches;
+      }
+      out->energy_[l] += mean * mean / static_cast<double>(count);
+    }
+  }
+  return out;
+}
+
+std::vector<float> ErrorSample::probe_radiance(Vec3 probe, uint32_t rays, int order) const {
+  const size_t J = static_cast<size_t>(sh_count(order)), lights = lights_.count();
+  std::vector<float> y(J), out(lights * J);
+  const Scene& scene = tracer_.scene();
+  for (uint32_t i = 0; i < rays; ++i) {
+    const Vec3 direction = sphere_direction(i, rays);
+    const Hit hit = tracer_.closest(probe, direction);
+    if (!hit) continue;
+    const Object& object = scene.objects[hit.object];
+    if (hit.back && !scene.materials[object.triangles[hit.triangle].material].double_sided) continue;
+    const uint32_t texel = search_.locate(hit);
+    if (texel == Receivers::kNone) continue;
+    const auto radiance = lights_.radiance(texel);
+    bool evaluated = false;
+    for (size_t l = 0; l < lights; ++l) {
+      if (!(radiance[l] > 0)) continue;
+      if (!evaluated) sh_evaluate(order, direction, y);
+      evaluated = true;
+      float* lambda = &out[l * J];
+      for (size_t j = 0; j < J; ++j) lambda[j] += radiance[l] * y[j];
+    }
+  }
+  for (float& v : out) v *= 4 * kPi / static_cast<float>(rays);
+  return out;
+}
+
+absl::StatusOr<ProbeErrors> ErrorSample::measure(const Plan& plan, const Parallel& how) const {
+  constexpr size_t J = kMaxShCount;
+  constexpr size_t kOrders = kMaxShOrder + 1;
+  Plan wide = plan;  // all orders at once: a lower one reads a part of the same coefficients
+  wide.params.order = kMaxShOrder;
+  wide.params.rays = kBatchRays;
+  const Scene& scene = tracer_.scene();
+  const size_t lights = lights_.count(), count = receivers_.size();
+
+  std::vector<Vec3> positions;
+  for (const Probe& p : plan.placement.probes) positions.push_back(p.position);
+  VisibilityCache cache(tracer_, plan.layout, plan.receivers.grids, positions);
+  Parallel quiet = how;
+  quiet.progress = nullptr;
+  std::vector<std::vector<float>> lambda(positions.size()), other(positions.size());
+  const bool lit = parallel_for(positions.size(), quiet, [&](uint64_t p) {
+    lambda[p] = probe_radiance(positions[p], kRelightRays, kMaxShOrder);
+    // Every fourth probe pays for the second lattice: enough to know the noise.
+    if (p % 4 == 0) other[p] = probe_radiance(positions[p], kOtherRelightRays, kMaxShOrder);
+  });
+  if (!lit) return cancelled();
+
+  // Per receiver and light: the error by order (without the noise of its own rays), that of a batch, unseen, of relight rays.
+  struct Sums {
+    std::array<double, kOrders> error2{};
+    double unseen2 = 0, relight2 = 0;
+  };
+  std::vector<Sums> sums(count * lights);
+  const bool done = parallel_for(count, how, [&](uint64_t i) {
+    const Receiver& r = ground_.receivers.all[receivers_[i]];
+    const uint32_t own = plan.receivers.find(r.object, r.key);
+    if (own == Receivers::kNone) return;  // a back side that this plan drops
+    const CellTask task = make_cell_task(wide, scene, alone(own));
+    Gatherer gatherer(tracer_, &cache, {task.probes, task.probe_ids}, {kMaxShOrder, kBatchRays, true});
+    std::vector<float> row(task.probes.size() * J);
+    std::vector<std::array<double, kBatches>> e(kOrders);
+    std::vector<double> model(lights * kOrders * kBatches), unseen(lights), relight(lights);
+    for (uint32_t b = 0; b < kBatches; ++b) {
+      std::fill(row.begin(), row.end(), 0.0f);
+      GatherPoint point = task.receivers.front();
+      point.seed = batch_seed(r.seed, b);
+      const GatherStats stats = gatherer.add_row(point, row);
+      const double share = static_cast<double>(stats.unseen) / kBatchRays;
+      for (size_t l = 0; l < lights; ++l) {
+        double band = 0;
+        for (int n = 0; n <= kMaxShOrder; ++n) {
+          for (size_t p = 0; p < task.probes.size(); ++p) {
+            const float* alpha = &row[p * J];
+            const float* probe = &lambda[task.probe_ids[p]][l * J];
+            for (int j = n * n; j < (n + 1) * (n + 1); ++j)
+              band += static_cast<double>(alpha[j]) * static_cast<double>(probe[j]);
+          }
+          model[(l * kOrders + static_cast<size_t>(n)) * kBatches + b] = band;
+        }
+        for (size_t p = 0; p < task.probes.size(); ++p) {
+          const auto& second = other[task.probe_ids[p]];
+          if (second.empty()) continue;
+          double difference = 0;
+          for (size_t j = 0; j < J; ++j) {
+            difference +=
+                static_cast<double>(row[p * J + j]) *
+                (static_cast<double>(lambda[task.probe_ids[p]][l * J + j]) - static_cast<double>(second[l * J + j]));
+          }
+          // Half of the squared difference is one lattice's variance; a quarter of the probes stand for all.
+          relight[l] += 4 * 0.5 * difference * difference / kBatches;
+        }
+        unseen[l] += share / kBatches;
+      }
+    }
+    for (size_t l = 0; l < lights; ++l) {
+      Sums& s = sums[i * lights + l];
+      const auto truth = [&](uint32_t b) { return static_cast<double>(truth_[(i * kBatches + b) * lights + l]); };
+      for (size_t n = 0; n < kOrders; ++n) {
+        const double* of = &model[(l * kOrders + n) * kBatches];
+        double mean = 0, square = 0;
+        for (uint32_t b = 0; b < kBatches; ++b) {
+          const double d = of[b] - truth(b);
+          mean += d / kBatches;
+          square += d * d;
+        }
+        const double variance = (square - kBatches * mean * mean) / (kBatches - 1);
+        s.error2[n] = mean * mean - variance / kBatches;
+      }
+      const double* finest = &model[(l * kOrders + kMaxShOrder) * kBatches];
+      double mean = 0;
+      for (uint32_t b = 0; b < kBatches; ++b) mean += finest[b] / kBatches;
+      s.relight2 = relight[l];
+      // What no probe sees is taken to be as bright as what is seen.
+      s.unseen2 = unseen[l] < 1 ? std::pow(mean * unseen[l] / (1 - unseen[l]), 2) : std::pow(truth(0), 2);
+    }
+  });
+  if (!done) return cancelled();
+
+  ProbeErrors out;
+  const auto total = [&](auto&& of) {
+    std::vector<double> by_light(lights);
+    for (size_t i = 0; i < count; ++i) {
+      for (size_t l = 0; l < lights; ++l) by_light[l] += of(sums[i * lights + l]) / static_cast<double>(count);
+    }
+    return relative(by_light, energy_);
+  };
+  const double relight = total([](const Sums& s) { return s.relight2; });
+  for (size_t n = 0; n < kOrders; ++n) {
+    const double error = total([n](const Sums& s) { return s.error2[n]; });
+    out.bandlimit[n] = std::sqrt(std::max(0.0, error * error - relight * relight));
+  }
+  out.unseen = total([](const Sums& s) { return s.unseen2; });
+  out.relight = std::sqrt(static_cast<double>(kRelightRays)) * relight;
+  return out;
+}
+
+}  // namespace lightloom

@@ -1,0 +1,50 @@
+// How far a plan's probes are from the truth, measured on a few receivers under a few lights before anything is baked.
+//
+// Truth and model look along the same gather rays and see the same texels, so that their difference is the model's alone.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "core/base/sh.h"
+#include "core/receivers/receiver_search.h"
+#include "core/tuning/sample_lights.h"
+
+namespace lightloom {
+
+/// In units of rel_rmse; geometric means over the lights.
+struct ProbeErrors {
+  std::array<double, kMaxShOrder + 1> bandlimit{};  ///< by the order of the probes: few, blurred measurements
+  double unseen = 0;                                ///< of it: light from what no probe in reach sees
+  double relight = 0;                               ///< of one relight ray: N rays have 1/√N of it
+};
+
+class ErrorSample {
+ public:
+  /// Keeps references to the tracer and the ground.
+  static absl::StatusOr<std::unique_ptr<ErrorSample>> create(const RayTracer& tracer, const Plan& ground,
+                                                             const Parallel& how);
+
+  /// REQUIRES: a finished plan on the ground, by the default method. Error: cancellation.
+  absl::StatusOr<ProbeErrors> measure(const Plan& plan, const Parallel& how) const;
+
+  const SampleLights& lights() const { return lights_; }
+  /// λ of a probe by `rays` relight rays: lights × sh_count(order).
+  std::vector<float> probe_radiance(Vec3 probe, uint32_t rays, int order) const;
+  /// E² under each light, mean over the receivers measured.
+  const std::vector<double>& energy() const { return energy_; }
+
+ private:
+  ErrorSample(const RayTracer& tracer, const Plan& ground);
+
+  const RayTracer& tracer_;
+  const Plan& ground_;
+  ReceiverSearch search_;
+  SampleLights lights_;
+  std::vector<uint32_t> receivers_;  // of the ground: front sides, spread over the level
+  std::vector<float> truth_;         // receivers × batches × lights
+  std::vector<double> energy_;
+};
+
+}  // namespace lightloom

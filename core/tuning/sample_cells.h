@@ -1,0 +1,53 @@
+// What compression costs and saves: a few of a plan's cells, gathered once and compressed in several ways.
+//
+// The factors that are kept average over a cluster's receivers, so that much of the noise of gather rays goes with the rank
+// that is cut off. Noise and truncation are therefore judged together, against rays of other seeds.
+#pragma once
+
+#include <vector>
+
+#include "core/compression/truncated_svd.h"
+#include "core/tuning/error_sample.h"
+
+namespace lightloom {
+
+struct CompressionChoice {
+  int order = 7, rays = 256, relight_rays = 4096, max_rank = 32;
+  float threshold = 0.02f;
+};
+
+/// Errors in units of rel_rmse.
+struct CompressionCost {
+  double error = 0;               ///< of noise and truncation, without fp16
+  double fp16 = 0;                ///< what rounding to 16 bits does
+  double bytes_per_receiver = 0;  ///< of cells: matrices, and what is kept of each receiver
+};
+
+class SampleCells {
+ public:
+  /// Gathers them, for all orders and ray counts. REQUIRES: a finished plan, by the default method; it need not outlive this.
+  /// Error: cancellation.
+  static absl::StatusOr<SampleCells> create(const RayTracer& tracer, const Plan& plan, const ErrorSample& sample,
+                                            const Parallel& how);
+
+  static constexpr int kRays[] = {64, 128, 256, 512};  ///< that can be asked for
+  /// Error: cancellation.
+  absl::StatusOr<CompressionCost> compress(const CompressionChoice& choice, const Parallel& how) const;
+
+ private:
+  static constexpr size_t kRayCounts = std::size(kRays);
+  static constexpr uint32_t kBatchRays = 64, kBatches = 8, kJudges = 4;  ///< batches that judge those
+
+  struct Cell {
+    std::vector<Vec3> positions;
+    Matrix transport[kRayCounts];            // of the widest order, by kRays
+    std::vector<float> judged;               // E: receivers × judging batches × lights × orders
+    std::vector<std::vector<float>> lambda;  // per light: probes × J of the widest order
+    uint64_t seed = 0;
+  };
+  std::vector<Cell> cells_;
+  size_t lights_ = 0, lit_ = 0;
+  std::vector<double> energy_;
+};
+
+}  // namespace lightloom
