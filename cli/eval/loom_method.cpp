@@ -89,7 +89,7 @@ class LoomModel : public Model {
     lightloom_create_info create{};
     create.struct_size = sizeof create;
     create.flags = LIGHTLOOM_CREATE_CPU;
-    create.threads = static_cast<uint32_t>(level_.threads());
+    create.threads = kFrameThreads;
     create.message = RuntimeMessages::receive;
     create.message_user = &messages_;
     LL_RETURN_IF_ERROR(messages_.status(lightloom_create(&create, &runtime_)));
@@ -107,15 +107,6 @@ class LoomModel : public Model {
 std::string with(const std::string& label, const std::string& more) {
   return label.empty() ? more : label + ", " + more;
 }
-
-std::string plain(double number) {
-  std::string text = std::to_string(number);
-  text.erase(text.find_last_not_of('0') + 1);
-  if (text.back() == '.') text.pop_back();
-  return text;
-}
-
-std::string times(double factor) { return "×" + plain(factor); }
 
 class LoomMethod : public Method {
  public:
@@ -213,7 +204,7 @@ class TunedMethod : public Method {
     std::vector<Variant> out;
     for (const double error :
          quick ? std::vector<double>{0.05, 0.1} : std::vector<double>{0.05, 0.035, 0.07, 0.1, 0.14, 0.2}) {
-      out.push_back({with("", "error " + plain(error)), {{"error", error}}});
+      out.push_back({"error " + plain(error), {{"error", error}}});
     }
     return out;
   }

@@ -29,6 +29,9 @@ struct Facts {
   uint64_t probes = 0;
 };
 
+/// That frames are timed on: how well work is spread over more is another question.
+inline constexpr int kFrameThreads = 1;
+
 /// A prepared method.
 class Model {
  public:
@@ -36,8 +39,8 @@ class Model {
   virtual const Facts& facts() const = 0;
   /// E as lightmap_image() has it, under the level's rig `rig`, after `bounces` frames from darkness.
   virtual absl::StatusOr<Image> light(size_t rig, int bounces) = 0;
-  /// Milliseconds of each of `frames` frames in which the light of every surface changes; on the level's threads. Empty: it
-  /// has no frames, because its light cannot change.
+  /// Milliseconds of each of `frames` frames in which the light of every surface changes, on kFrameThreads. Empty: it has no
+  /// frames, because its light cannot change.
   virtual absl::StatusOr<std::vector<double>> frame_ms(int frames) = 0;
 };
 
@@ -60,7 +63,13 @@ const std::vector<std::unique_ptr<Method>>& all_methods();
 // One maker each, in files of their own.
 std::unique_ptr<Method> loom_method(BakeMethod method);
 std::unique_ptr<Method> tuned_method();
+std::unique_ptr<Method> sh_method();
+std::unique_ptr<Method> ddgi_method();
 std::unique_ptr<Method> static_lightmap_method();
+
+/// "0.5", "×0.5".
+std::string plain(double number);
+std::string times(double factor);
 
 /// Processor seconds of this process so far, all threads.
 double processor_seconds();
