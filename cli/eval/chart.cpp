@@ -10,8 +10,8 @@ namespace lightloom::eval {
 namespace {
 
 // Okabe & Ito's colours, which the colour-blind can tell apart; marks differ too.
-constexpr const char* kColours[] = {"#0072B2", "#D55E00", "#009E73", "#CC79A7", "#7a7a7a", "#E69F00", "#56B4E9"};
-constexpr double kWidth = 720, kHeight = 440, kLeft = 68, kRight = 16, kTop = 34, kBottom = 84;
+constexpr const char* kColours[] = {"#0072B2", "#56B4E9", "#D55E00", "#009E73", "#CC79A7", "#7a7a7a", "#E69F00"};
+constexpr double kWidth = 720, kHeight = 458, kLeft = 68, kRight = 16, kTop = 34, kBottom = 102;
 
 std::string number(double v) {
   char text[32];
@@ -201,12 +201,13 @@ std::string chart_svg(const Chart& chart) {
              "\" stroke-dasharray=\"4 3\"/>\n";
     }
   }
-  double left = kLeft;
-  const double row = kHeight - 26;
+  double left = kLeft, row = kHeight - 46;
   for (size_t s = 0; s < chart.series.size(); ++s) {
+    const double wide = 34 + 6.6 * static_cast<double>(chart.series[s].title.size());
+    if (left + wide > kWidth && left > kLeft) left = kLeft, row += 18;
     out += mark(s, left + 6, row, true, chart.series[s].title);
     out += text(left + 16, row + 4, chart.series[s].title);
-    left += 34 + 6.6 * static_cast<double>(chart.series[s].title.size());
+    left += wide;
   }
   out += text(kLeft, kHeight - 6,
               "Grey line: Pareto front. Full marks lie on it. Circled: a method's default. Dashed: measured elsewhere.",

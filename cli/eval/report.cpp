@@ -294,8 +294,8 @@ absl::StatusOr<std::string> report_html(const Page& page) {
   out +=
       "<p><b>Error</b> is rel_rmse, ‖E − E<sub>truth</sub>‖ ÷ ‖E<sub>truth</sub>‖ over receiver texels, weighted by "
       "area, without the noise of the "
-      "path-traced truth; over rigs the geometric mean. Bakes take all threads; frames are run on the processor, by as "
-      "many threads, for every method.</p>\n";
+      "path-traced truth; over rigs the geometric mean. Bakes take all threads; frames are run on one "
+      "thread of the processor, for every method.</p>\n";
 
   out += "<h2>At each method's default</h2>\n";
   std::vector<Row> rows;

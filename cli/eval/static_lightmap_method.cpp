@@ -50,7 +50,7 @@ class StaticLightmap : public Model {
 class StaticLightmapMethod : public Method {
  public:
   std::string name() const override { return "static"; }
-  std::string title() const override { return "static lightmap"; }
+  std::string title() const override { return "static lightmap (1 rig)"; }
   std::string about() const override {
     return "E path traced at every texel for one rig of lights (lightloom reference): nothing may move, and each rig "
            "is a bake "

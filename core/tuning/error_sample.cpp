@@ -21,16 +21,20 @@ absl::Status cancelled() { return absl::CancelledError("cancelled while choosing
 
 uint64_t batch_seed(uint64_t seed, uint32_t batch) { return hash_combine(seed, 0x7a3e + batch); }
 
-/// Mean over lights of √(error² ÷ energy): what is estimated without bias may come out below zero for one of them.
+/// Mean over lights of √(error² ÷ energy): what is estimated without bias may come out below zero for one of them. Lights that
+/// hardly light anything indirectly, by the median, count less: a lamp in a box has a large error that nobody sees.
 double relative(const std::vector<double>& error2, const std::vector<double>& energy) {
-  double sum = 0;
-  size_t lit = 0;
+  std::vector<double> sorted = energy;
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
+  double sum = 0, weights = 0;
   for (size_t l = 0; l < energy.size(); ++l) {
     if (!(energy[l] > 0)) continue;
-    sum += std::sqrt(std::max(0.0, error2[l] / energy[l]));
-    ++lit;
+    const double weight = std::min(1.0, energy[l] / *middle);
+    sum += weight * std::sqrt(std::max(0.0, error2[l] / energy[l]));
+    weights += weight;
   }
-  return lit > 0 ? sum / static_cast<double>(lit) : 0;
+  return weights > 0 ? sum / weights : 0;
 }
 
 PlannedCell alone(uint32_t receiver) {

@@ -61,8 +61,11 @@ absl::StatusOr<SampleCells> SampleCells::create(const RayTracer& tracer, const P
   SampleCells out;
   out.lights_ = sample.lights().count();
   const size_t lights = out.lights_;
-  out.energy_ = sample.energy();
-  out.lit_ = static_cast<size_t>(std::count_if(out.energy_.begin(), out.energy_.end(), [](double e) { return e > 0; }));
+  // A light's own energy is the unit of its errors; those that light little count less (as in ErrorSample).
+  double all = 0;
+  for (const double e : sample.energy()) all += e / static_cast<double>(lights);
+  for (const double e : sample.energy())
+    out.weight_.push_back(e > 0 ? 1 / std::max(e, all) / static_cast<double>(lights) : 0);
   const size_t count = std::min({(plan.cells.size() + kShare - 1) / kShare, kMost, plan.cells.size()});
   out.cells_.resize(count);
   std::vector<Vec3> positions;
@@ -176,7 +179,7 @@ absl::StatusOr<CompressionCost> SampleCells::compress(const CompressionChoice& c
       for (Half& h : coarse.projection) h = rounded_further(h);
       for (Half& h : coarse.reconstruction) h = rounded_further(h);
       for (size_t l = 0; l < lights_; ++l) {
-        if (!(energy_[l] > 0)) continue;
+        if (!(weight_[l] > 0)) continue;
         const std::vector<float> lambda = narrowed(cell.lambda[l], choice.order);
         const std::vector<float> e = decode_cluster(cluster, compressed.uniform, choice.order, lambda);
         const std::vector<float> rough = decode_cluster(coarse, compressed.uniform, choice.order, lambda);
@@ -192,10 +195,10 @@ absl::StatusOr<CompressionCost> SampleCells::compress(const CompressionChoice& c
           const double of_mean = (square - kJudges * mean * mean) / (kJudges - 1) / kJudges;  // its variance
           const double error = static_cast<double>(e[r]) - mean;
           const double rounded = static_cast<double>(rough[r]) - static_cast<double>(e[r]);
-          s.error2 += (error * error - of_mean) / energy_[l];
+          s.error2 += (error * error - of_mean) * weight_[l];
           // One bit more is rounded by one unit of what was kept, every other time: six times the variance of the rounding
           // that kept it.
-          s.rounding2 += rounded * rounded / 6 / energy_[l];
+          s.rounding2 += rounded * rounded / 6 * weight_[l];
         }
       }
     }
@@ -207,11 +210,10 @@ absl::StatusOr<CompressionCost> SampleCells::compress(const CompressionChoice& c
     all.bytes += s.bytes, all.receivers += s.receivers;
   }
   CompressionCost out;
-  const double samples = all.receivers * static_cast<double>(std::max<size_t>(1, lit_));
-  if (samples > 0) {
+  if (all.receivers > 0) {
     out.bytes_per_receiver = all.bytes / all.receivers;
-    out.fp16 = std::sqrt(all.rounding2 / samples);
-    out.error = std::sqrt(std::max(0.0, (all.error2 - all.rounding2) / samples));
+    out.fp16 = std::sqrt(all.rounding2 / all.receivers);
+    out.error = std::sqrt(std::max(0.0, (all.error2 - all.rounding2) / all.receivers));
   }
   return out;
 }

@@ -46,8 +46,8 @@ class SampleCells {
     uint64_t seed = 0;
   };
   std::vector<Cell> cells_;
-  size_t lights_ = 0, lit_ = 0;
-  std::vector<double> energy_;
+  size_t lights_ = 0;
+  std::vector<double> weight_;  // per light, of a squared error
 };
 
 }  // namespace lightloom

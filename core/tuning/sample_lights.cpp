@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/base/rng.h"
 #include "core/base/sampling.h"
@@ -14,15 +15,21 @@ constexpr uint64_t kSeed = 0x7a3e;   // of nothing else
 constexpr uint32_t kTries = 24;      // places per light
 constexpr uint32_t kClearRays = 48;  // that measure how far a place is from any surface
 constexpr float kClear = 0.2f;       // of the default spacing: far enough
+constexpr float kEnclosed = 0.4f;    // share of them that must hit something
 constexpr size_t kSpots = 4;         // every so many lights one is a spot
 constexpr float kSpotAngle = 0.5f;   // radians from the axis
 
-float clearance(const RayTracer& tracer, Vec3 p, float enough) {
+/// How good a place is for a lamp: distance to the nearest surface, `enough` at most; below 0 where most of what is around is
+/// void, like outside a house whose rooms are the level.
+float quality(const RayTracer& tracer, Vec3 p, float enough) {
   float nearest = enough;
+  uint32_t hits = 0;
   for (uint32_t i = 0; i < kClearRays; ++i) {
-    nearest = std::min(nearest, tracer.closest(p, sphere_direction(i, kClearRays), enough).t);
+    const Hit hit = tracer.closest(p, sphere_direction(i, kClearRays));
+    nearest = std::min(nearest, hit.t);
+    hits += static_cast<bool>(hit);
   }
-  return nearest;
+  return static_cast<float>(hits) < kEnclosed * kClearRays ? nearest - 2 * enough : nearest;
 }
 
 /// Half-way, or so, from a receiver among first..end−1 to what it sees.
@@ -41,11 +48,11 @@ Light light_at(const RayTracer& tracer, const Plan& ground, size_t index, size_t
   const float spacing = default_spacing(tracer.scene().bounds()), enough = kClear * spacing;
   Rng rng(hash_combine(kSeed, index));
   Light light;
-  float best = -1;
+  float best = -std::numeric_limits<float>::infinity();
   for (uint32_t i = 0; i < kTries && best < enough; ++i) {
     const Vec3 place = place_of(tracer, ground, first, end, spacing, &rng);
-    const float clear = clearance(tracer, place, enough);
-    if (clear > best) best = clear, light.position = place;
+    const float good = quality(tracer, place, enough);
+    if (good > best) best = good, light.position = place;
   }
   if (index % kSpots == kSpots - 1) {
     light.type = LightType::kSpot;
