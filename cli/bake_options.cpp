@@ -9,12 +9,12 @@ constexpr float kDefaultError = 0.05f;
 
 std::vector<Option> BakeOptions::options() {
   return {{"--error",
-           "relative error (RMS, one bounce) for which the cheapest model is chosen, unless it is given by the options "
-           "below [0.05]",
+           "choose the cheapest model by its estimated relative error (RMS, one bounce), in place of the options from "
+           "--spacing to --threshold",
            &error_},
-          {"--budget", "of the asset, like 32MB: the most accurate model that it holds; 0: none, --error counts",
+          {"--budget", "choose the most accurate model of about so many bytes at most, like 32MB; 0: no budget",
            SizeOption{&budget_}},
-          {"--retune", "choose anew, whatever the parameters of OUT.loom are", &retune_},
+          {"--retune", "choose anew for --error [0.05] or --budget, whatever the parameters of OUT.loom are", &retune_},
           {"--method", "default, or sl17: Silvennoinen & Lehtinen 2017 as published, to compare with", &method_},
           {"--spacing", "side of a probe cell, metres [0: chosen from the level]", &spacing_},
           {"--order", "spherical harmonics order of the probes, 0 to 9 [7]", &order_},
@@ -43,8 +43,9 @@ std::string BakeOptions::fixed() const {
 }
 
 std::optional<TuneTarget> BakeOptions::target(const BakeParams* earlier) const {
-  if ((earlier != nullptr && !retune_) || !fixed().empty()) return std::nullopt;
+  if (earlier != nullptr && !retune_) return std::nullopt;
   if (budget_ > 0) return TuneTarget{0, budget_};
+  if (!error_ && !retune_) return std::nullopt;
   return TuneTarget{static_cast<double>(error_.value_or(kDefaultError)), 0};
 }
 

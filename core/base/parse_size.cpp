@@ -28,6 +28,9 @@ std::optional<double> take_number(std::string_view* text) {
 absl::StatusOr<uint64_t> parse_size(std::string_view text) {
   std::string_view rest = text;
   const std::optional<double> number = take_number(&rest);
+  if (rest.size() > 1 && rest.front() != 'B' && (rest.substr(1) == "B" || rest.substr(1) == "iB")) {
+    rest.remove_suffix(rest.size() - 1);  // 5MB and 5MiB are 5M
+  }
   const size_t power = rest.empty() ? 0 : std::string_view("BKMGT").find(rest.front());
   if (number && rest.size() <= 1 && power != std::string_view::npos) {
     const double bytes = std::floor(*number * std::ldexp(1.0, static_cast<int>(10 * power)));

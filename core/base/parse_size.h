@@ -9,7 +9,7 @@
 
 namespace lightloom {
 
-/// Bytes of "0", "500M", "20G", "1.5T": K, M, G and T are powers of 1024. InvalidArgument, one line, for anything else.
+/// Bytes of "0", "500M", "20G", "1.5T", "32MB": K, M, G and T are powers of 1024. InvalidArgument, one line, for anything else.
 absl::StatusOr<uint64_t> parse_size(std::string_view text);
 
 /// Seconds of "90", "90s", "15m", "12h", "30d". InvalidArgument, one line, for anything else.

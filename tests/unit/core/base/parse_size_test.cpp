@@ -19,11 +19,13 @@ TEST(ParseSize, UnitsArePowersOf1024) {
   EXPECT_EQ(*parse_size("20G"), uint64_t{20} << 30);
   EXPECT_EQ(*parse_size("1.5G"), uint64_t{3} << 29);
   EXPECT_EQ(*parse_size("2T"), uint64_t{2} << 40);
+  EXPECT_EQ(*parse_size("32MB"), uint64_t{32} << 20);
+  EXPECT_EQ(*parse_size("3GiB"), uint64_t{3} << 30);
 }
 
 TEST(ParseSize, AnythingElseIsRefusedInOneLine) {
   for (const char* text :
-       {"", "G", "-1", "+1", "1 G", "1GB", "1g", "1e3", "0x10", "nan", "inf", "9999999999T", "1\n"}) {
+       {"", "G", "-1", "+1", "1 G", "1Gb", "1BB", "1iB", "1GiBB", "1g", "1e3", "0x10", "nan", "inf", "9999999999T", "1\n"}) {
     const auto size = parse_size(text);
     ASSERT_FALSE(size.ok()) << text;
     EXPECT_EQ(std::string(size.status().message()).find('\n'), std::string::npos);
