@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <utility>
 
@@ -23,6 +24,7 @@ constexpr double kAlmost = 1.04;  // an order whose error is this near to the be
 constexpr int kRelightRays[] = {512, 1024, 2048, 4096, 8192};
 // Thresholds that are tried, times the target: loose ones first.
 constexpr double kThresholds[] = {1.4, 1, 0.7, 0.5, 0.35, 0.25};
+constexpr double kFalling = 0.95;
 constexpr int kRanks[] = {32, 64};
 constexpr double kSurfaceBytes = 24,
                  kProbeBytes = 200;  // beside the cells: per receiver, and per probe besides its rays
@@ -120,7 +122,7 @@ class Tuner {
         if (!any || candidate.parts.total() < out.chosen.parts.total()) out.chosen = candidate, step = s;
         any = true;
       }
-      if (any && !fits && s > step + 1) break;
+      if (!fits && s > step + 1) break;  // finer ones take more
     }
     if (!any) {
       return absl::InvalidArgumentError("--budget is too small: the least model of this level takes about " +
@@ -199,8 +201,10 @@ class Tuner {
       cells_.emplace(step, std::move(cells));
     }
     std::optional<std::pair<CompressionCost, CompressionChoice>> best;
+    const auto enough = [&] { return best && best->first.error <= most; };
     for (const int rank : kRanks) {
       for (const int rays : SampleCells::kRays) {
+        double before = std::numeric_limits<double>::infinity();
         for (const double threshold : kThresholds) {
           CompressionChoice choice = choice_of(*params);
           choice.rays = rays;
@@ -208,11 +212,13 @@ class Tuner {
           choice.threshold = static_cast<float>(std::clamp(threshold * error, 0.002, 0.5));
           LL_ASSIGN_OR_RETURN(const CompressionCost cost, cells_.at(step).compress(choice, how));
           if (!best || cost.error < best->first.error) best = {cost, choice};
-          if (cost.error <= most) break;
+          // Once it falls no more, what is left is noise: only more rays help.
+          if (enough() || cost.error > kFalling * before) break;
+          before = cost.error;
         }
-        if (best->first.error <= most) break;
+        if (enough()) break;
       }
-      if (best->first.error <= most) break;
+      if (enough()) break;
     }
     params->rays = best->second.rays;
     params->max_rank = best->second.max_rank;

@@ -24,8 +24,8 @@ TEST(ParseSize, UnitsArePowersOf1024) {
 }
 
 TEST(ParseSize, AnythingElseIsRefusedInOneLine) {
-  for (const char* text :
-       {"", "G", "-1", "+1", "1 G", "1Gb", "1BB", "1iB", "1GiBB", "1g", "1e3", "0x10", "nan", "inf", "9999999999T", "1\n"}) {
+  for (const char* text : {"", "G", "-1", "+1", "1 G", "1Gb", "1BB", "1iB", "1GiBB", "1g", "1e3", "0x10", "nan", "inf",
+                           "9999999999T", "1\n"}) {
     const auto size = parse_size(text);
     ASSERT_FALSE(size.ok()) << text;
     EXPECT_EQ(std::string(size.status().message()).find('\n'), std::string::npos);
