@@ -1,5 +1,7 @@
 #include "cli/bake_options.h"
 
+#include <cstdio>
+
 namespace lightloom {
 namespace {
 
@@ -53,7 +55,16 @@ absl::StatusOr<BakeParams> BakeOptions::tuned(const RayTracer& tracer, const Bak
                                               const BakeControl& control, std::optional<Tuning>* tuning) const {
   BakeParams p = params(earlier);
   const std::optional<TuneTarget> for_what = target(earlier);
-  if (!for_what) return p;
+  if (!for_what) {
+    if (earlier != nullptr && (error_ || budget_ > 0)) {
+      std::fprintf(stderr, "lightloom: the parameters of the earlier bake are kept; --retune chooses anew\n");
+    }
+    return p;
+  }
+  if (p.method == BakeMethod::kSl17) {
+    return absl::InvalidArgumentError(
+        "--retune chooses for the default method, and the asset is sl17's: add --method default");
+  }
   p.spacing = 0;
   LL_ASSIGN_OR_RETURN(const Tuning chosen, tune(tracer, p, *for_what, control));
   p = chosen.chosen.params;

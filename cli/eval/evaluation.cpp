@@ -7,6 +7,7 @@
 
 #include "cli/interrupt.h"
 #include "core/base/file.h"
+#include "core/base/random_id.h"
 #include "core/base/version.h"
 #include "core/reference/compare.h"
 
@@ -40,12 +41,19 @@ std::string machine() {
   return "unknown processor";
 }
 
+/// Pictures are made of them.
+bool lightmaps_missing(const Request& request, const Method& method, size_t rigs) {
+  std::error_code unknown;
+  for (size_t i = 0; i < rigs; ++i) {
+    if (!std::filesystem::exists(lightmap_path(request.folder, method.name(), i), unknown)) return true;
+  }
+  return false;
+}
+
 /// One round: prepares the variant once more, and the first time lights and judges it.
 absl::Status measure(LitLevel* level, const Request& request, const Method& method, const Variant& variant,
                      const std::vector<Truth>& truths, bool keep_lightmaps, Run* run) {
-  const std::filesystem::path scratch = std::filesystem::path(request.folder) / "scratch";
-  std::error_code ignored;
-  std::filesystem::remove_all(scratch, ignored);
+  const std::filesystem::path scratch = std::filesystem::path(request.folder) / ("scratch-" + random_id());
   struct Remove {
     const std::filesystem::path& path;
     ~Remove() {
@@ -126,7 +134,8 @@ absl::StatusOr<Evaluation> evaluate(LitLevel* level, const std::string& name, co
       job.run.settings = job.variant.settings;
       job.path = std::filesystem::path(request.folder) / "runs" /
                  (method->name() + "-" + file_name(job.variant.label) + ".json");
-      if (auto run = load_run(job.path, job.run.key)) job.run = *std::move(run);
+      auto run = load_run(job.path, job.run.key);
+      if (run && !(job.first && lightmaps_missing(request, *method, level->rigs()))) job.run = *std::move(run);
       jobs.push_back(std::move(job));
     }
   }

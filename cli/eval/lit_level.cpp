@@ -6,6 +6,7 @@
 
 #include "cli/interrupt.h"
 #include "core/base/file.h"
+#include "core/base/text.h"
 #include "core/reference/path_tracer.h"
 #include "core/relight/lightmap.h"
 
@@ -105,7 +106,8 @@ absl::StatusOr<Truth> LitLevel::truth(size_t rig, const TruthOptions& o, const s
   Truth truth;
   if (const auto bytes = read_file(facts); bytes.ok()) {
     const auto json = nlohmann::json::parse(bytes->begin(), bytes->end(), nullptr, /*allow_exceptions=*/false);
-    if (json.is_object() && json.value("key", "") == key) {
+    const auto is_number = [&](const char* name) { return json.contains(name) && json[name].is_number(); };
+    if (json.is_object() && json.contains("key") && json["key"] == key && is_number("noise") && is_number("samples")) {
       auto stored = read_exr(image);
       if (stored.ok()) {
         truth.image = *std::move(stored);
@@ -127,6 +129,16 @@ absl::StatusOr<Truth> LitLevel::truth(size_t rig, const TruthOptions& o, const s
     truth.image = std::move(traced.image);
     truth.noise = traced.noise;
     if (truth.noise <= o.noise || truth.samples >= o.most_samples) break;
+  }
+  const auto dark = [&](const char* channel) {
+    const std::vector<float>& values = *truth.image.channel(channel);
+    return std::all_of(values.begin(), values.end(), [](float v) { return v == 0; });
+  };
+  if (dark("R") && dark("G") && dark("B")) {
+    return absl::InvalidArgumentError(
+        "rig '" + printable(name(rig)) +
+        "' lights nothing indirectly, so there is nothing to compare: leave it out, or give "
+        "rigs by --lights");
   }
   // Methods are judged where all of them must have a value: at the receivers.
   const Image receivers = lightmap_image(elements_, std::vector<Vec3>(elements_.receivers.all.size()));

@@ -13,7 +13,7 @@
 
 namespace lightloom {
 
-/// In units of rel_rmse; geometric means over the lights.
+/// In units of rel_rmse; means over the lights.
 struct ProbeErrors {
   std::array<double, kMaxShOrder + 1> bandlimit{};  ///< by the order of the probes: few, blurred measurements
   double unseen = 0;                                ///< of it: light from what no probe in reach sees

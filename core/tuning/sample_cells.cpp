@@ -61,11 +61,11 @@ absl::StatusOr<SampleCells> SampleCells::create(const RayTracer& tracer, const P
   SampleCells out;
   out.lights_ = sample.lights().count();
   const size_t lights = out.lights_;
-  // A light's own energy is the unit of its errors; those that light little count less (as in ErrorSample).
-  double all = 0;
-  for (const double e : sample.energy()) all += e / static_cast<double>(lights);
-  for (const double e : sample.energy())
-    out.weight_.push_back(e > 0 ? 1 / std::max(e, all) / static_cast<double>(lights) : 0);
+  // Lights count alike, but for those that light hardly anything (as in ErrorSample).
+  std::vector<double> sorted = sample.energy();
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
+  for (const double e : sample.energy()) out.weight_.push_back(e > 0 ? 1 / std::max(e, *middle) : 0);
   const size_t count = std::min({(plan.cells.size() + kShare - 1) / kShare, kMost, plan.cells.size()});
   out.cells_.resize(count);
   std::vector<Vec3> positions;
@@ -149,7 +149,7 @@ absl::StatusOr<SampleCells> SampleCells::create(const RayTracer& tracer, const P
 
 absl::StatusOr<CompressionCost> SampleCells::compress(const CompressionChoice& choice, const Parallel& how) const {
   struct Sums {
-    double error2 = 0, rounding2 = 0;  // of E relative to the level's under a light, summed over lights and receivers
+    double error2 = 0, rounding2 = 0, energy2 = 0;  // weighted alike, summed over lights and receivers
     double bytes = 0, receivers = 0;
   };
   const size_t of_rays =
@@ -196,6 +196,7 @@ absl::StatusOr<CompressionCost> SampleCells::compress(const CompressionChoice& c
           const double error = static_cast<double>(e[r]) - mean;
           const double rounded = static_cast<double>(rough[r]) - static_cast<double>(e[r]);
           s.error2 += (error * error - of_mean) * weight_[l];
+          s.energy2 += (mean * mean - of_mean) * weight_[l];
           // One bit more is rounded by one unit of what was kept, every other time: six times the variance of the rounding
           // that kept it.
           s.rounding2 += rounded * rounded / 6 * weight_[l];
@@ -206,14 +207,15 @@ absl::StatusOr<CompressionCost> SampleCells::compress(const CompressionChoice& c
   if (!done) return cancelled();
   Sums all;
   for (const Sums& s : sums) {
-    all.error2 += s.error2, all.rounding2 += s.rounding2;
+    all.error2 += s.error2, all.rounding2 += s.rounding2, all.energy2 += s.energy2;
     all.bytes += s.bytes, all.receivers += s.receivers;
   }
   CompressionCost out;
-  if (all.receivers > 0) {
-    out.bytes_per_receiver = all.bytes / all.receivers;
-    out.fp16 = std::sqrt(all.rounding2 / all.receivers);
-    out.error = std::sqrt(std::max(0.0, (all.error2 - all.rounding2) / all.receivers));
+  if (all.receivers > 0) out.bytes_per_receiver = all.bytes / all.receivers;
+  // Of the energy of the same receivers: few cells know little of the level's.
+  if (all.energy2 > 0) {
+    out.fp16 = std::sqrt(all.rounding2 / all.energy2);
+    out.error = std::sqrt(std::max(0.0, (all.error2 - all.rounding2) / all.energy2));
   }
   return out;
 }

@@ -99,7 +99,7 @@ class Tuner {
         step = s;
       }
     }
-    out.met = true;
+    out.met = out.chosen.parts.total() <= error;
     LL_RETURN_IF_ERROR(look_ahead(step, &out));
     return out;
   }

@@ -271,8 +271,9 @@ Streamer::Progress Streamer::load(const Wish& wish) {
   }
   const Detail detail = wish.target.kind == AssetIndex::Kind::kCell ? detail_of(static_cast<CellLevel>(wish.level))
                                                                     : detail_of(static_cast<ProbeLevel>(wish.level));
+  const bool moving = backend_->pending_bytes() > 0;
   status = backend_->load(*std::move(chunk), detail);
-  if (!status.ok()) return no_room(wish.target, status);
+  if (!status.ok()) return no_room(wish.target, status, moving);
   set_level(wish.target, wish.level);
   note_failure(wish.target, {});
   return Progress::kStep;
@@ -285,11 +286,12 @@ void Streamer::note_failure(const AssetIndex::Target& target, Failure failure) {
   noted = failure;
 }
 
-Streamer::Progress Streamer::no_room(const AssetIndex::Target& target, const absl::Status& status) {
+Streamer::Progress Streamer::no_room(const AssetIndex::Target& target, const absl::Status& status, bool moving) {
   const lightloom_result result = result_of(status);
   if (is_the_chunks_fault(result)) return put_off(target, status);
   // Uploads that are to come free what they replace, and what was dropped is free some frames later.
-  if (backend_->pending_bytes() > 0) return Progress::kWait;
+  // The last of them may have come since the load was refused.
+  if (moving || backend_->pending_bytes() > 0) return Progress::kWait;
   if (is_full(result) && failures_[number_of(target)].times > 0) {
     // There was time enough: this is all there is, for now.
     budget_ = state_.bytes;

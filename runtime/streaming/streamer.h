@@ -77,7 +77,8 @@ class Streamer {
   bool make_room(uint64_t bytes);
   void drop(const AssetIndex::Target& target);
   Progress load(const Wish& wish);
-  Progress no_room(const AssetIndex::Target& target, const absl::Status& status);
+  /// `moving`: uploads were on their way before.
+  Progress no_room(const AssetIndex::Target& target, const absl::Status& status, bool moving);
   Progress put_off(const AssetIndex::Target& target, const absl::Status& status);
   void note_failure(const AssetIndex::Target& target, Failure failure);
   bool waits(const AssetIndex::Target& target) const;
