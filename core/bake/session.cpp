@@ -78,13 +78,6 @@ uint64_t bytes_of(const RayTracer& tracer, const Plan& plan) {
   return bytes + bytes_of(plan.receivers.all) + bytes_of(plan.placement.probes);
 }
 
-std::vector<Vec3> positions_of(const std::vector<Probe>& probes) {
-  std::vector<Vec3> positions;
-  positions.reserve(probes.size());
-  for (const Probe& p : probes) positions.push_back(p.position);
-  return positions;
-}
-
 }  // namespace
 
 BakeSession::BakeSession(const RayTracer& tracer, Plan plan)

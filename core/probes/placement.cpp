@@ -267,6 +267,13 @@ absl::StatusOr<PlacementResult> place_probes(const RayTracer& tracer, Receivers*
   return result;
 }
 
+std::vector<Vec3> positions_of(const std::vector<Probe>& probes) {
+  std::vector<Vec3> positions;
+  positions.reserve(probes.size());
+  for (const Probe& p : probes) positions.push_back(p.position);
+  return positions;
+}
+
 float default_spacing(const Aabb& bounds) {
   const Vec3 size = bounds.size();
   const double longest = std::max({size.x, size.y, size.z});

@@ -21,6 +21,8 @@ struct Probe {
   ProbeName name() const { return {cell, slot}; }
 };
 
+std::vector<Vec3> positions_of(const std::vector<Probe>& probes);
+
 struct PlacementOptions {
   float spacing = 1;  ///< ρ, metres
   int nearest = 22;   ///< how many probes a receiver can reach: links and fallbacks

@@ -1,6 +1,5 @@
 #include "core/tuning/error_sample.h"
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
@@ -15,22 +14,16 @@ constexpr uint32_t kBatches = 4, kBatchRays = 128;  // their spread tells the no
 constexpr uint32_t kRelightRays = 1024, kOtherRelightRays = 987;  // two lattices, so that their difference is noise
 constexpr size_t kLeastReceivers = 512, kMostReceivers = 1024, kShare = 32;
 
-using RowMatrix = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
 absl::Status cancelled() { return absl::CancelledError("cancelled while choosing parameters"); }
 
 uint64_t batch_seed(uint64_t seed, uint32_t batch) { return hash_combine(seed, 0x7a3e + batch); }
 
-/// Mean over lights of √(error² ÷ energy): what is estimated without bias may come out below zero for one of them. Lights that
-/// hardly light anything indirectly, by the median, count less: a lamp in a box has a large error that nobody sees.
-double relative(const std::vector<double>& error2, const std::vector<double>& energy) {
-  std::vector<double> sorted = energy;
-  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-  std::nth_element(sorted.begin(), middle, sorted.end());
+/// Mean over lights of √(error² ÷ energy): what is estimated without bias may come out below zero for one of them.
+double relative(const std::vector<double>& error2, const std::vector<double>& energy, double typical) {
   double sum = 0, weights = 0;
   for (size_t l = 0; l < energy.size(); ++l) {
     if (!(energy[l] > 0)) continue;
-    const double weight = std::min(1.0, energy[l] / *middle);
+    const double weight = std::min(1.0, energy[l] / typical);
     sum += weight * std::sqrt(std::max(0.0, error2[l] / energy[l]));
     weights += weight;
   }
@@ -82,14 +75,8 @@ absl::StatusOr<std::unique_ptr<ErrorSample>> ErrorSample::create(const RayTracer
       const Strata strata = strata_of(kBatchRays);
       for (uint32_t k = 0; k < kBatchRays; ++k) {
         const GatherRay ray = gather_ray(point, k, strata, &rng);
-        const Hit hit = tracer.closest(ray.origin, ray.direction);
-        if (!hit) continue;
-        const Object& object = scene.objects[hit.object];
-        if (hit.back && !scene.materials[object.triangles[hit.triangle].material].double_sided) continue;
-        const uint32_t texel = out->search_.locate(hit);
-        if (texel == Receivers::kNone) continue;
-        const auto radiance = out->lights_.radiance(texel);
-        for (size_t l = 0; l < lights; ++l) e[l] += kPi / kBatchRays * radiance[l];
+        const auto radiance = out->radiance(ray.origin, ray.direction);
+        for (size_t l = 0; l < radiance.size(); ++l) e[l] += kPi / kBatchRays * radiance[l];
       }
     }
   });
@@ -107,21 +94,24 @@ absl::StatusOr<std::unique_ptr<ErrorSample>> ErrorSample::create(const RayTracer
   return out;
 }
 
+std::span<const float> ErrorSample::radiance(Vec3 origin, Vec3 direction) const {
+  const Hit hit = tracer_.closest(origin, direction);
+  if (!hit) return {};
+  const Scene& scene = tracer_.scene();
+  const Object& object = scene.objects[hit.object];
+  if (hit.back && !scene.materials[object.triangles[hit.triangle].material].double_sided) return {};
+  const uint32_t texel = search_.locate(hit);
+  return texel == Receivers::kNone ? std::span<const float>() : lights_.radiance(texel);
+}
+
 std::vector<float> ErrorSample::probe_radiance(Vec3 probe, uint32_t rays, int order) const {
   const size_t J = static_cast<size_t>(sh_count(order)), lights = lights_.count();
   std::vector<float> y(J), out(lights * J);
-  const Scene& scene = tracer_.scene();
   for (uint32_t i = 0; i < rays; ++i) {
     const Vec3 direction = sphere_direction(i, rays);
-    const Hit hit = tracer_.closest(probe, direction);
-    if (!hit) continue;
-    const Object& object = scene.objects[hit.object];
-    if (hit.back && !scene.materials[object.triangles[hit.triangle].material].double_sided) continue;
-    const uint32_t texel = search_.locate(hit);
-    if (texel == Receivers::kNone) continue;
-    const auto radiance = lights_.radiance(texel);
+    const auto radiance = this->radiance(probe, direction);
     bool evaluated = false;
-    for (size_t l = 0; l < lights; ++l) {
+    for (size_t l = 0; l < radiance.size(); ++l) {
       if (!(radiance[l] > 0)) continue;
       if (!evaluated) sh_evaluate(order, direction, y);
       evaluated = true;
@@ -133,6 +123,13 @@ std::vector<float> ErrorSample::probe_radiance(Vec3 probe, uint32_t rays, int or
   return out;
 }
 
+double ErrorSample::typical_energy() const {
+  std::vector<double> sorted = energy_;
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
+  return *middle;
+}
+
 absl::StatusOr<ProbeErrors> ErrorSample::measure(const Plan& plan, const Parallel& how) const {
   constexpr size_t J = kMaxShCount;
   constexpr size_t kOrders = kMaxShOrder + 1;
@@ -142,8 +139,7 @@ absl::StatusOr<ProbeErrors> ErrorSample::measure(const Plan& plan, const Paralle
   const Scene& scene = tracer_.scene();
   const size_t lights = lights_.count(), count = receivers_.size();
 
-  std::vector<Vec3> positions;
-  for (const Probe& p : plan.placement.probes) positions.push_back(p.position);
+  const std::vector<Vec3> positions = positions_of(plan.placement.probes);
   VisibilityCache cache(tracer_, plan.layout, plan.receivers.grids, positions);
   Parallel quiet = how;
   quiet.progress = nullptr;
@@ -168,7 +164,6 @@ absl::StatusOr<ProbeErrors> ErrorSample::measure(const Plan& plan, const Paralle
     const CellTask task = make_cell_task(wide, scene, alone(own));
     Gatherer gatherer(tracer_, &cache, {task.probes, task.probe_ids}, {kMaxShOrder, kBatchRays, true});
     std::vector<float> row(task.probes.size() * J);
-    std::vector<std::array<double, kBatches>> e(kOrders);
     std::vector<double> model(lights * kOrders * kBatches), unseen(lights), relight(lights);
     for (uint32_t b = 0; b < kBatches; ++b) {
       std::fill(row.begin(), row.end(), 0.0f);
@@ -232,7 +227,7 @@ absl::StatusOr<ProbeErrors> ErrorSample::measure(const Plan& plan, const Paralle
     for (size_t i = 0; i < count; ++i) {
       for (size_t l = 0; l < lights; ++l) by_light[l] += of(sums[i * lights + l]) / static_cast<double>(count);
     }
-    return relative(by_light, energy_);
+    return relative(by_light, energy_, typical_energy());
   };
   const double relight = total([](const Sums& s) { return s.relight2; });
   for (size_t n = 0; n < kOrders; ++n) {

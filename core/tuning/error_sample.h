@@ -34,9 +34,14 @@ class ErrorSample {
   std::vector<float> probe_radiance(Vec3 probe, uint32_t rays, int order) const;
   /// E² under each light, mean over the receivers measured.
   const std::vector<double>& energy() const { return energy_; }
+  /// Their median. Lights that hardly light anything indirectly, by this, are to count less: a lamp in a box has a large error
+  /// that nobody sees.
+  double typical_energy() const;
 
  private:
   ErrorSample(const RayTracer& tracer, const Plan& ground);
+  /// What comes along a ray, by light; empty: nothing.
+  std::span<const float> radiance(Vec3 origin, Vec3 direction) const;
 
   const RayTracer& tracer_;
   const Plan& ground_;

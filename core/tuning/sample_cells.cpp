@@ -62,14 +62,11 @@ absl::StatusOr<SampleCells> SampleCells::create(const RayTracer& tracer, const P
   out.lights_ = sample.lights().count();
   const size_t lights = out.lights_;
   // Lights count alike, but for those that light hardly anything (as in ErrorSample).
-  std::vector<double> sorted = sample.energy();
-  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-  std::nth_element(sorted.begin(), middle, sorted.end());
-  for (const double e : sample.energy()) out.weight_.push_back(e > 0 ? 1 / std::max(e, *middle) : 0);
+  const double typical = sample.typical_energy();
+  for (const double e : sample.energy()) out.weight_.push_back(e > 0 ? 1 / std::max(e, typical) : 0);
   const size_t count = std::min({(plan.cells.size() + kShare - 1) / kShare, kMost, plan.cells.size()});
   out.cells_.resize(count);
-  std::vector<Vec3> positions;
-  for (const Probe& p : plan.placement.probes) positions.push_back(p.position);
+  const std::vector<Vec3> positions = positions_of(plan.placement.probes);
   VisibilityCache cache(tracer, plan.layout, plan.receivers.grids, positions);
   Parallel quiet = how;
   quiet.progress = nullptr;

@@ -178,8 +178,10 @@ class Tuner {
     // With as many rays as were gathered, what is left is what the rank cuts off.
     CompressionChoice quiet = choice_of(out.params);
     quiet.rays = *std::rbegin(SampleCells::kRays);
-    LL_ASSIGN_OR_RETURN(const CompressionCost truncation,
-                        cells_.at(step).compress(quiet, control_.stage("parameters: rank")));
+    CompressionCost truncation = cost;
+    if (quiet.rays != out.params.rays) {
+      LL_ASSIGN_OR_RETURN(truncation, cells_.at(step).compress(quiet, control_.stage("parameters: rank")));
+    }
     out.parts.truncation = std::min(truncation.error, cost.error);
     out.parts.noise = std::sqrt(cost.error * cost.error - out.parts.truncation * out.parts.truncation);
     const double receivers = static_cast<double>(at->plan.receivers.all.size());

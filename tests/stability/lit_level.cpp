@@ -114,14 +114,7 @@ std::unique_ptr<BakedLevel> bake_at(Scene scene, float spacing, float texels_per
 }
 
 Field relight(const BakedLevel& level, int bounces, int samples, Device device) {
-  const SurfaceInputs inputs = value_or_die(light_surfaces(*level.tracer, level.elements, samples, {}));
-  PlayOptions options;
-  options.iterations = bounces;
-  options.player = device == Device::kCpu    ? Player::kDecoder
-                   : device == Device::kSimd ? Player::kSimd
-                                             : Player::kVulkan;
-  options.validation = device == Device::kVulkan;
-  return value_or_die(play(level.loom(), inputs, level.scene->environment, options));
+  return light(level, bounces, device, samples);
 }
 
 Truth trace_truth(const BakedLevel& level, int bounces, int samples, uint64_t seed) {

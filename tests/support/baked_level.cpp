@@ -32,8 +32,8 @@ std::unique_ptr<BakedLevel> bake_level(Scene scene, const BakeParams& params, in
   return level;
 }
 
-std::vector<Vec3> light(const BakedLevel& level, int bounces, Device device) {
-  const SurfaceInputs inputs = value_or_die(light_surfaces(*level.tracer, level.elements, 16, {}));
+std::vector<Vec3> light(const BakedLevel& level, int bounces, Device device, int samples) {
+  const SurfaceInputs inputs = value_or_die(light_surfaces(*level.tracer, level.elements, samples, {}));
   PlayOptions options;
   options.iterations = bounces;
   options.player = device == Device::kCpu    ? Player::kDecoder

@@ -40,8 +40,9 @@ std::unique_ptr<BakedLevel> bake_level(Scene scene, const BakeParams& params, in
 
 /// E per surface element after `bounces` frames, by the reference decoder, by the runtime on the processor, or by Vulkan under the
 /// validation layers.
+/// `samples`: points per texel where direct light and colours are taken.
 enum class Device { kCpu, kSimd, kVulkan };
-std::vector<Vec3> light(const BakedLevel& level, int bounces, Device device = Device::kCpu);
+std::vector<Vec3> light(const BakedLevel& level, int bounces, Device device = Device::kCpu, int samples = 16);
 
 /// The value, or the program ends with the error's text.
 template <class T>
