@@ -92,7 +92,13 @@ nlohmann::json to_json(const Evaluation& e) {
                        {"probes", run->facts.probes},
                        {"beaten_in", beaten_in}};
   }
-  return {{"level", e.level}, {"receivers", e.receivers}, {"variants", e.runs.size()}, {"methods", methods}};
+  nlohmann::json out = {
+      {"level", e.level}, {"receivers", e.receivers}, {"variants", e.runs.size()}, {"methods", methods}};
+  if (e.expected) {
+    out["operator_norm_rank_correlation"] = {{"relative_to_own_light", e.expected->own_correlation()},
+                                             {"relative_to_mean", e.expected->correlation()}};
+  }
+  return out;
 }
 
 void print(const Options& o, const Evaluation& e) {

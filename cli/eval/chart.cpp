@@ -102,6 +102,12 @@ std::string mark(size_t series, double x, double y, bool filled, const std::stri
   return shape + "<title>" + escape_markup(words) + "</title>" + end;
 }
 
+/// Many marks at once: lines of no length with round ends.
+std::string dots(size_t series, const std::string& path) {
+  return "<path d=\"" + path + "\" fill=\"none\" stroke=\"" + kColours[series % std::size(kColours)] +
+         "\" stroke-width=\"4\" stroke-linecap=\"round\" stroke-opacity=\"0.45\"/>\n";
+}
+
 std::string text(double x, double y, const std::string& words, const std::string& more = "") {
   return "<text x=\"" + number(x) + "\" y=\"" + number(y) + "\" " + more + ">" + escape_markup(words) + "</text>\n";
 }
@@ -169,7 +175,7 @@ std::string chart_svg(const Chart& chart) {
   for (size_t s = 0; s < chart.series.size(); ++s) {
     for (size_t p = 0; p < chart.series[s].points.size(); ++p) {
       const ChartPoint& point = chart.series[s].points[p];
-      if (chart.series[s].joined || !shown(point)) continue;
+      if (chart.scatter || chart.series[s].joined || !shown(point)) continue;
       costs.push_back({point.x, point.y});
       where.emplace_back(s, p);
     }
@@ -184,18 +190,24 @@ std::string chart_svg(const Chart& chart) {
   if (!line.empty()) {
     out += "<path d=\"" + line + "\" fill=\"none\" stroke=\"#bbb\" stroke-width=\"5\" stroke-linejoin=\"round\"/>\n";
   }
-  for (size_t s = chart.series.size(); s-- > 0;) {  // ours last, on top
-    std::string joined;
+  for (size_t i = chart.series.size(); i-- > 0;) {  // ours last, on top; lines over dots
+    const size_t s = chart.scatter ? chart.series.size() - 1 - i : i;
+    std::string joined, scattered;
     for (size_t p = 0; p < chart.series[s].points.size(); ++p) {
       const ChartPoint& point = chart.series[s].points[p];
       if (!shown(point)) continue;
       const double px = x.at(point.x), py = y.at(point.y);
       if (chart.series[s].joined) joined += (joined.empty() ? "M" : "L") + number(px) + " " + number(py);
+      if (chart.scatter && !chart.series[s].joined) {
+        scattered += "M" + number(px) + " " + number(py) + "h0";
+        continue;
+      }
       if (point.is_default) {
         out += "<circle cx=\"" + number(px) + "\" cy=\"" + number(py) + "\" r=\"9\" fill=\"none\" stroke=\"#222\"/>\n";
       }
       out += mark(s, px, py, best[s][p] || chart.series[s].joined, chart.series[s].title + ", " + point.words) + "\n";
     }
+    if (!scattered.empty()) out += dots(s, scattered);
     if (!joined.empty()) {
       out += "<path d=\"" + joined + "\" fill=\"none\" stroke=\"" + kColours[s % std::size(kColours)] +
              "\" stroke-dasharray=\"4 3\"/>\n";
@@ -209,9 +221,12 @@ std::string chart_svg(const Chart& chart) {
     out += text(left + 16, row + 4, chart.series[s].title);
     left += wide;
   }
-  out += text(kLeft, kHeight - 6,
-              "Grey line: Pareto front. Full marks lie on it. Circled: a method's default. Dashed: measured elsewhere.",
-              "font-size=\"10.5\" fill=\"#666\"");
+  if (!chart.scatter) {
+    out +=
+        text(kLeft, kHeight - 6,
+             "Grey line: Pareto front. Full marks lie on it. Circled: a method's default. Dashed: measured elsewhere.",
+             "font-size=\"10.5\" fill=\"#666\"");
+  }
   return out + "</svg>\n";
 }
 

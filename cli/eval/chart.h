@@ -20,6 +20,7 @@ struct ChartSeries {
 
 struct Chart {
   std::string title, x_title, y_title;
+  bool scatter = false;             ///< dots, without a front and words
   std::vector<ChartSeries> series;  ///< colours and marks follow the order
 };
 

@@ -153,6 +153,14 @@ absl::StatusOr<Evaluation> evaluate(LitLevel* level, const std::string& name, co
     }
   }
   for (Job& job : jobs) out.runs.push_back(std::move(job.run));
+  if (default_run(out, kDefaultMethod) != nullptr) {
+    std::vector<Image> lightmaps;
+    for (size_t i = 0; i < level->rigs(); ++i) {
+      LL_ASSIGN_OR_RETURN(lightmaps.emplace_back(), read_exr(lightmap_path(request.folder, kDefaultMethod, i)));
+    }
+    LL_ASSIGN_OR_RETURN(out.expected, expected_error(level, truths, lightmaps));
+    level->bar()->finish();
+  }
   return out;
 }
 
@@ -161,9 +169,17 @@ absl::Status save(const Evaluation& e, const std::filesystem::path& path) {
   for (const auto& r : e.rigs) rigs.push_back({{"name", r.name}, {"noise", r.noise}, {"samples", r.samples}});
   for (const auto& m : e.methods) methods.push_back({{"name", m.name}, {"title", m.title}, {"about", m.about}});
   for (const Run& r : e.runs) runs.push_back(to_json(r));
-  const nlohmann::json json = {{"level", e.level},         {"machine", e.machine}, {"receivers", e.receivers},
-                               {"triangles", e.triangles}, {"bounces", e.bounces}, {"rigs", rigs},
-                               {"methods", methods},       {"runs", runs}};
+  nlohmann::json json = {{"level", e.level},         {"machine", e.machine}, {"receivers", e.receivers},
+                         {"triangles", e.triangles}, {"bounces", e.bounces}, {"rigs", rigs},
+                         {"methods", methods},       {"runs", runs}};
+  if (e.expected) {
+    json["expected_error"] = {{"rank_correlation", e.expected->correlation()},
+                              {"noise", e.expected->noise},
+                              {"norm", e.expected->norm},
+                              {"error", e.expected->error},
+                              {"own_rank_correlation", e.expected->own_correlation()},
+                              {"own_error", e.expected->own_error}};
+  }
   return write_file_atomic(path, json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
 }
 
@@ -180,6 +196,10 @@ absl::StatusOr<Evaluation> load_evaluation(const std::filesystem::path& path) {
     for (const auto& r : json.at("rigs")) e.rigs.push_back({r.at("name"), r.at("noise"), r.at("samples")});
     for (const auto& m : json.at("methods")) e.methods.push_back({m.at("name"), m.at("title"), m.at("about")});
     for (const auto& r : json.at("runs")) e.runs.push_back(run_from_json(r));
+    if (json.contains("expected_error")) {
+      const auto& x = json.at("expected_error");
+      e.expected = ExpectedError{x.at("norm"), x.at("error"), x.at("own_error"), x.at("noise")};
+    }
     return e;
   } catch (const nlohmann::json::exception& error) {
     return absl::InvalidArgumentError(path.string() + " is no evaluation: make it again with lightloom eval");

@@ -2,9 +2,11 @@
 // tracing.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "cli/eval/expected_error.h"
 #include "cli/eval/run.h"
 
 namespace lightloom::eval {
@@ -34,7 +36,8 @@ struct Evaluation {
     std::string name, title, about;
   };
   std::vector<MethodWords> methods;
-  std::vector<Run> runs;  ///< by method; the first of each is its default
+  std::vector<Run> runs;                  ///< by method; the first of each is its default
+  std::optional<ExpectedError> expected;  ///< of our default settings, where they were evaluated
 };
 
 absl::StatusOr<Evaluation> evaluate(LitLevel* level, const std::string& name, const Request& request);

@@ -112,7 +112,7 @@ class LoomMethod : public Method {
  public:
   explicit LoomMethod(BakeMethod method) : method_(method) {}
 
-  std::string name() const override { return sl17() ? "sl17" : "default"; }
+  std::string name() const override { return sl17() ? "sl17" : kDefaultMethod; }
   std::string title() const override { return sl17() ? "SL17 as published" : "lightloom"; }
   std::string about() const override {
     return sl17() ? "Silvennoinen & Lehtinen 2017 as published: candidates next to surfaces thinned by density, one "

@@ -57,6 +57,9 @@ class Method {
                                                          const std::filesystem::path& scratch) const = 0;
 };
 
+/// The name of our bake as it is by default.
+inline constexpr const char* kDefaultMethod = "default";
+
 /// All methods, ours first.
 const std::vector<std::unique_ptr<Method>>& all_methods();
 

@@ -132,6 +132,34 @@ std::string equals(const Evaluation& e) {
                rows, 9);
 }
 
+NamedChart expected_error_chart(const std::string& level, const ExpectedError& expected) {
+  ChartSeries receivers{"a receiver", {}, false}, medians{"median of each tenth", {}, true};
+  for (size_t i = 0; i < expected.norm.size(); ++i) {
+    receivers.points.push_back({expected.norm[i], expected.own_error[i], "", false});
+  }
+  for (const auto& t : expected.tenths()) {
+    medians.points.push_back({t.norm, t.error, format("norm %.3f", t.norm) + format(", error %.4f", t.error), false});
+  }
+  return {"operator-norm",
+          {level + ": error over all light, and under the rigs",
+           "operator norm (SL17, Eq. 12), 1: nothing comes through",
+           "Σ|ΔE| ÷ ΣE of a receiver, over the rigs",
+           true,
+           {std::move(receivers), std::move(medians)}}};
+}
+
+std::string expected_error_words(const ExpectedError& x) {
+  return "<p>Where errors are to be expected, whatever the light: SL17's operator norm (Eq. 12, a receiver's light "
+         "projected to its probes and back) of the default settings has, over " +
+         std::to_string(x.norm.size()) + " receivers, the <b>rank correlation " + format("%.2f", x.own_correlation()) +
+         "</b> (Spearman) with the error relative to what the receiver gets over all rigs, and " +
+         format("%.2f", x.correlation()) +
+         " with |ΔE| relative to the level's mean E, which is as large as the receiver is bright. The truth's own "
+         "noise, "
+         "which no norm foresees, is " +
+         format("%.0f", 100 * x.noise) + " % of the squared error, and lowers both.</p>\n";
+}
+
 absl::StatusOr<std::string> picture(const std::string& path, const std::string& words) {
   if (path.empty()) return std::string();
   LL_ASSIGN_OR_RETURN(const auto bytes, read_file(path));
@@ -234,7 +262,7 @@ std::vector<NamedChart> make_charts(const Evaluation& e, const Curve* curve) {
   std::vector<NamedChart> charts;
   for (const CostAxis& axis : kAxes) {
     NamedChart named{std::string("error-") + axis.name,
-                     {e.level + ": " + axis.title, axis.words, "error, geometric mean over the rigs", {}}};
+                     {e.level + ": " + axis.title, axis.words, "error, geometric mean over the rigs", false, {}}};
     for (const auto& m : e.methods) {
       ChartSeries series{m.title, {}, false};
       for (const Run& r : e.runs) {
@@ -248,6 +276,7 @@ std::vector<NamedChart> make_charts(const Evaluation& e, const Curve* curve) {
     }
     charts.push_back(std::move(named));
   }
+  if (e.expected) charts.push_back(expected_error_chart(e.level, *e.expected));
   return charts;
 }
 
@@ -323,6 +352,7 @@ absl::StatusOr<std::string> report_html(const Page& page) {
     }
     out += "</ul>\n";
   }
+  if (e.expected) out += expected_error_words(*e.expected);
   if (page.curve != nullptr && !page.curve->about.empty()) {
     out += "<p><small>" + escape_markup(page.curve->title) + ": " + escape_markup(page.curve->about) + "</small></p>\n";
   }

@@ -43,14 +43,19 @@ void dilate(Image* image) {
 
 }  // namespace
 
+std::array<int, 2> pixel_of(const SurfaceElements& elements, const Receiver& receiver) {
+  const Texel& texel = elements.receivers.grids[receiver.object].texels[receiver.texel];
+  const auto& at = elements.layout.placements[receiver.object];
+  return {at.x + static_cast<int>(texel.x), at.y + static_cast<int>(texel.y)};
+}
+
 Image lightmap_image(const SurfaceElements& elements, std::span<const Vec3> irradiance, bool back) {
   Image image(elements.layout.width, elements.layout.height, {"R", "G", "B", "A", "area"});
   for (size_t i = 0; i < elements.receivers.all.size(); ++i) {
     const Receiver& r = elements.receivers.all[i];
     if (r.back != back) continue;
     const Texel& texel = elements.receivers.grids[r.object].texels[r.texel];
-    const int x = elements.layout.placements[r.object].x + static_cast<int>(texel.x);
-    const int y = elements.layout.placements[r.object].y + static_cast<int>(texel.y);
+    const auto [x, y] = pixel_of(elements, r);
     // Objects of a scene atlas may meet in a border texel: it belongs to the one that covers its centre.
     float& alpha = (*image.channel("A"))[image.index(x, y)];
     if (alpha > 0 && !texel.centre_covered) continue;

@@ -1,6 +1,7 @@
 // Irradiance per surface element as images: the lightmap users sample, and its value at a hit.
 #pragma once
 
+#include <array>
 #include <span>
 
 #include "core/receivers/receiver_search.h"
@@ -13,6 +14,9 @@ namespace lightloom {
 /// next to one (gutters, texels inside solids) are filled from their neighbours, A = 0, so that bilinear filtering stays
 /// clean.
 Image lightmap_image(const SurfaceElements& elements, std::span<const Vec3> irradiance, bool back = false);
+
+/// Where that is: x, y.
+std::array<int, 2> pixel_of(const SurfaceElements& elements, const Receiver& receiver);
 
 /// Bilinear over the receivers of the hit's object and side around it; the nearest one if there is none.
 /// `search` is of the elements' receivers.

@@ -5,18 +5,20 @@
 
 #include "core/bake/tasks.h"
 #include "core/transport/gather.h"
+#include "core/tuning/receiver_sample.h"
 
 namespace lightloom {
 namespace {
 
 constexpr int kLights = 16;
+constexpr uint64_t kSeed = 0x7a3e;                  // of nothing else
 constexpr uint32_t kBatches = 4, kBatchRays = 128;  // their spread tells the noise, which is not the model's
 constexpr uint32_t kRelightRays = 1024, kOtherRelightRays = 987;  // two lattices, so that their difference is noise
 constexpr size_t kLeastReceivers = 512, kMostReceivers = 1024, kShare = 32;
 
 absl::Status cancelled() { return absl::CancelledError("cancelled while choosing parameters"); }
 
-uint64_t batch_seed(uint64_t seed, uint32_t batch) { return hash_combine(seed, 0x7a3e + batch); }
+uint64_t batch_seed(uint64_t seed, uint32_t batch) { return hash_combine(seed, kSeed + batch); }
 
 /// Mean over lights of √(error² ÷ energy): what is estimated without bias may come out below zero for one of them.
 double relative(const std::vector<double>& error2, const std::vector<double>& energy, double typical) {
@@ -30,12 +32,6 @@ double relative(const std::vector<double>& error2, const std::vector<double>& en
   return weights > 0 ? sum / weights : 0;
 }
 
-PlannedCell alone(uint32_t receiver) {
-  PlannedCell cell;
-  cell.receivers = {receiver};
-  return cell;
-}
-
 }  // namespace
 
 ErrorSample::ErrorSample(const RayTracer& tracer, const Plan& ground)
@@ -46,21 +42,9 @@ absl::StatusOr<std::unique_ptr<ErrorSample>> ErrorSample::create(const RayTracer
   std::unique_ptr<ErrorSample> out(new ErrorSample(tracer, ground));
   LL_ASSIGN_OR_RETURN(out->lights_, SampleLights::create(tracer, ground, kLights, how));
 
-  std::vector<uint32_t> fronts;
-  for (uint32_t i = 0; i < ground.receivers.all.size(); ++i) {
-    if (!ground.receivers.all[i].back) fronts.push_back(i);
-  }
-  if (fronts.empty()) {
-    for (uint32_t i = 0; i < ground.receivers.all.size(); ++i) fronts.push_back(i);
-  }
-  const size_t wanted = std::clamp(fronts.size() / kShare, kLeastReceivers, kMostReceivers);
-  const size_t count = std::min(wanted, fronts.size());
-  for (size_t i = 0; i < count; ++i) {  // one of each stretch: neighbours have neighbouring numbers
-    const size_t first = i * fronts.size() / count, end = (i + 1) * fronts.size() / count;
-    Rng rng(hash_combine(0x7a3e, i));
-    out->receivers_.push_back(fronts[first + rng.next_below(static_cast<uint32_t>(end - first))]);
-  }
-
+  const std::vector<uint32_t> fronts = front_receivers(ground.receivers);
+  out->receivers_ = stratified(fronts, std::clamp(fronts.size() / kShare, kLeastReceivers, kMostReceivers), kSeed);
+  const size_t count = out->receivers_.size();
   const size_t lights = out->lights_.count();
   out->truth_.assign(count * kBatches * lights, 0);
   const Scene& scene = tracer.scene();
@@ -68,7 +52,7 @@ absl::StatusOr<std::unique_ptr<ErrorSample>> ErrorSample::create(const RayTracer
     // Rays start where a bake's do: the task of the receiver knows.
     const Plan& plan = ground;
     const Receiver& r = plan.receivers.all[out->receivers_[i]];
-    GatherPoint point = make_cell_task(plan, scene, alone(out->receivers_[i])).receivers.front();
+    GatherPoint point = make_cell_task(plan, scene, cell_of_one(out->receivers_[i])).receivers.front();
     for (uint32_t b = 0; b < kBatches; ++b) {
       float* e = &out->truth_[(i * kBatches + b) * lights];
       Rng rng(batch_seed(r.seed, b));
@@ -161,7 +145,7 @@ absl::StatusOr<ProbeErrors> ErrorSample::measure(const Plan& plan, const Paralle
     const Receiver& r = ground_.receivers.all[receivers_[i]];
     const uint32_t own = plan.receivers.find(r.object, r.key);
     if (own == Receivers::kNone) return;  // a back side that this plan drops
-    const CellTask task = make_cell_task(wide, scene, alone(own));
+    const CellTask task = make_cell_task(wide, scene, cell_of_one(own));
     Gatherer gatherer(tracer_, &cache, {task.probes, task.probe_ids}, {kMaxShOrder, kBatchRays, true});
     std::vector<float> row(task.probes.size() * J);
     std::vector<double> model(lights * kOrders * kBatches), unseen(lights), relight(lights);

@@ -69,9 +69,15 @@ TEST(Report, IsOnePageThatNeedsNothingElse) {
 TEST(Report, ComesBackFromDisk) {
   const test::TemporaryFolder folder;
   const auto path = folder.path() / "evaluation.json";
-  ASSERT_TRUE(save(example(), path).ok());
+  Evaluation e = example();
+  e.expected = ExpectedError{{0.1, 0.2, 0.3}, {1, 2, 4}, {5, 9, 7}, 0.25};
+  ASSERT_TRUE(save(e, path).ok());
   const auto back = load_evaluation(path);
   ASSERT_TRUE(back.ok()) << back.status();
+  ASSERT_TRUE(back->expected);
+  EXPECT_EQ(back->expected->correlation(), 1);
+  EXPECT_EQ(back->expected->own_correlation(), 0.5);
+  EXPECT_EQ(back->expected->noise, 0.25);
   EXPECT_EQ(results_csv(back->level, back->runs), results_csv(example().level, example().runs));
   EXPECT_EQ(back->methods.size(), 3u);
   ASSERT_TRUE(write_file_atomic(path, "{}").ok());
@@ -90,10 +96,31 @@ TEST(Chart, MarksTheFrontAndLeavesOutWhatHasNoPlace) {
 }
 
 TEST(Chart, OfNothingIsAChart) {
-  const std::string svg = chart_svg({"none", "x", "y", {{"a", {{0, 1, "", false}}, false}}});
+  const std::string svg = chart_svg({"none", "x", "y", false, {{"a", {{0, 1, "", false}}, false}}});
   EXPECT_THAT(svg, HasSubstr("</svg>"));
   EXPECT_THAT(svg, Not(HasSubstr("nan")));
   EXPECT_THAT(svg, Not(HasSubstr("inf")));
+}
+
+TEST(Chart, OfExpectedErrorsHasTheirMedians) {
+  Evaluation e = example();
+  e.expected = ExpectedError{};
+  for (int i = 1; i <= 100; ++i) {
+    e.expected->norm.push_back(0.01 * i);
+    e.expected->error.push_back(1);
+    e.expected->own_error.push_back(0.001 * (i <= 50 ? i : 51));
+  }
+  EXPECT_EQ(e.expected->correlation(), 0);
+  EXPECT_GT(e.expected->own_correlation(), 0.9);
+  const auto tenths = e.expected->tenths();
+  ASSERT_EQ(tenths.size(), 10u);
+  EXPECT_NEAR(tenths[0].norm, 0.055, 1e-9);
+  EXPECT_NEAR(tenths[9].error, 0.051, 1e-9);
+  const auto charts = make_charts(e, nullptr);
+  ASSERT_EQ(charts.back().name, "operator-norm");
+  const std::string svg = chart_svg(charts.back().chart);
+  EXPECT_THAT(svg, HasSubstr("norm 0.055, error 0.0055"));
+  EXPECT_THAT(svg, Not(HasSubstr("Pareto")));
 }
 
 TEST(Curve, IsReadLineByLine) {
