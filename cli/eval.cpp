@@ -9,6 +9,7 @@
 
 #include "cli/command.h"
 #include "cli/eval/evaluation.h"
+#include "cli/eval/pool.h"
 #include "cli/eval/report.h"
 #include "cli/files.h"
 #include "cli/interrupt.h"
@@ -24,6 +25,7 @@ using namespace eval;
 
 struct Options {
   std::string scene, lights, output, methods, curve, stability, name;
+  std::vector<std::string> pool;
   bool quick = false, json = false;
   int bounces = 1, repeats = 1, frames = 9, rigs = 0, threads = 0, samples = 1024, most_samples = 4096,
       lightmap_size = 0;
@@ -61,6 +63,12 @@ absl::StatusOr<std::vector<const Method*>> choose(const std::string& names) {
 
 absl::Status check(const Options& o) {
   const auto bad = [](const std::string& what) { return absl::InvalidArgumentError(what); };
+  if (!o.pool.empty()) {
+    if (!o.scene.empty() || !o.lights.empty()) return bad("--pool goes without SCENE and --lights: leave them out");
+    for (const std::string& folder : o.pool) LL_RETURN_IF_ERROR(check_input(folder + "/evaluation.json"));
+    return OutputCheck(o.pool).file("-o", o.output + "/report.html", {".html"});
+  }
+  if (o.scene.empty()) return bad("SCENE is required, or --pool");
   LL_RETURN_IF_ERROR(check_level(o.scene, o.lights, ""));
   LL_RETURN_IF_ERROR(choose(o.methods).status());
   LL_RETURN_IF_ERROR(check_params(o.params()));
@@ -115,6 +123,41 @@ void print(const Options& o, const Evaluation& e) {
   std::printf("%s/report.html\n", escape_controls(o.output).c_str());
 }
 
+void show(const Options& o, const Evaluation& e) {
+  if (o.json) {
+    print_json(to_json(e));
+  } else {
+    print(o, e);
+  }
+}
+
+absl::Status write_charts(const Options& o, const std::vector<NamedChart>& charts) {
+  for (const NamedChart& c : charts) {
+    LL_RETURN_IF_ERROR(write_file_atomic(std::filesystem::path(o.output) / (c.name + ".svg"), chart_svg(c.chart)));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status run_pool(const Options& o) {
+  std::vector<Evaluation> levels;
+  std::string command = "lightloom eval --pool";
+  for (const std::string& folder : o.pool) {
+    LL_ASSIGN_OR_RETURN(levels.emplace_back(), load_evaluation(std::filesystem::path(folder) / "evaluation.json"));
+    command += " " + std::filesystem::path(folder).lexically_normal().filename().string();
+  }
+  LL_ASSIGN_OR_RETURN(const Evaluation e, pool(levels));
+  const auto charts = make_charts(e, nullptr);
+  const std::filesystem::path out(o.output);
+  LL_RETURN_IF_ERROR(write_charts(o, charts));
+  LL_RETURN_IF_ERROR(write_file_atomic(out / "results.csv", results_csv(e.level, e.runs)));
+  LL_RETURN_IF_ERROR(write_file_atomic(out / "levels.csv", rigs_csv(e.level, e.runs)));
+  command += " -o " + out.lexically_normal().filename().string();
+  LL_ASSIGN_OR_RETURN(const std::string html, report_html({e, charts, {}, nullptr, {}, command, levels}));
+  LL_RETURN_IF_ERROR(write_file_atomic(out / "report.html", html));
+  show(o, e);
+  return absl::OkStatus();
+}
+
 /// As it would be typed again.
 std::string command_of(const Options& o) {
   const std::filesystem::path scene(o.scene);
@@ -131,6 +174,7 @@ std::string command_of(const Options& o) {
 }
 
 absl::Status run(const Options& o) {
+  if (!o.pool.empty()) return run_pool(o);
   cancel_on_interrupt();
   ProgressBar bar;
   Request request;
@@ -158,18 +202,14 @@ absl::Status run(const Options& o) {
 
   const std::filesystem::path out(o.output);
   const auto charts = make_charts(e, curve ? &*curve : nullptr);
-  for (const NamedChart& c : charts) LL_RETURN_IF_ERROR(write_file_atomic(out / (c.name + ".svg"), chart_svg(c.chart)));
+  LL_RETURN_IF_ERROR(write_charts(o, charts));
   LL_RETURN_IF_ERROR(write_file_atomic(out / "results.csv", results_csv(name, e.runs)));
   LL_RETURN_IF_ERROR(write_file_atomic(out / "rigs.csv", rigs_csv(name, e.runs)));
   LL_RETURN_IF_ERROR(save(e, out / "evaluation.json"));
   LL_ASSIGN_OR_RETURN(const std::string html,
-                      report_html({e, charts, sheets, curve ? &*curve : nullptr, stability, command_of(o)}));
+                      report_html({e, charts, sheets, curve ? &*curve : nullptr, stability, command_of(o), {}}));
   LL_RETURN_IF_ERROR(write_file_atomic(out / "report.html", html));
-  if (o.json) {
-    print_json(to_json(e));
-  } else {
-    print(o, e);
-  }
+  show(o, e);
   return absl::OkStatus();
 }
 
@@ -180,9 +220,10 @@ Command eval_command() {
   return {
       "eval",
       "Chart speed against accuracy: our bake, its settings, and other methods, judged by path tracing",
-      {{"SCENE", "level, .glb or .gltf", &o->scene, true},
+      {{"SCENE", "level, .glb or .gltf", &o->scene},
        {"-o,--output", "folder for report.html, charts, results.csv; what is there already is not measured again",
         &o->output, true},
+       {"--pool", "folders of earlier evaluations, in place of SCENE: their levels as one", &o->pool},
        {"--lights", "lights.json with the rigs to judge by; empty: the level's own lights", &o->lights},
        {"--rigs", "use so many of them; 0: all, 3 with --quick", &o->rigs},
        {"--methods", "some of them, as a,b; the first is compared with the others; empty: all", &o->methods},

@@ -24,6 +24,7 @@ struct Request {
 /// What a report is made of.
 struct Evaluation {
   std::string level, machine;
+  std::vector<std::string> pooled;  ///< the levels it is of, if several: pool.h
   uint64_t receivers = 0, triangles = 0;
   int bounces = 1;
   struct Rig {

@@ -1,6 +1,7 @@
 #include "cli/eval/pareto.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <numeric>
 
@@ -22,6 +23,23 @@ std::vector<size_t> pareto_front(const std::vector<Cost>& points) {
     least = points[i].error;
   }
   return front;
+}
+
+std::optional<double> error_at(const std::vector<Cost>& front, double x) {
+  for (size_t i = 0; i < front.size(); ++i) {
+    if (front[i].x < x) continue;
+    if (front[i].x == x) return front[i].error;
+    if (i == 0) return std::nullopt;
+    const Cost &a = front[i - 1], &b = front[i];
+    return a.error * std::pow(b.error / a.error, std::log(x / a.x) / std::log(b.x / a.x));
+  }
+  return front.empty() ? std::nullopt : std::optional(front.back().error);
+}
+
+std::optional<double> cost_at(const std::vector<Cost>& front, double error) {
+  std::vector<Cost> turned;
+  for (auto it = front.rbegin(); it != front.rend(); ++it) turned.push_back({it->error, it->x});
+  return error_at(turned, error);
 }
 
 }  // namespace lightloom::eval

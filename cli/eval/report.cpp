@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <functional>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "cli/eval/pareto.h"
 #include "core/base/file.h"
@@ -83,53 +84,36 @@ Row costs_of(const Run& r) {
           or_dash(frame_bytes, megabytes(frame_bytes)),
           or_dash(static_cast<double>(r.facts.probes), std::to_string(r.facts.probes))};
 }
-const Row kCostTitles = {"error", "worst rig", "bake, s", "core-s", "MB", "frame, ms", "read a frame, MB", "probes"};
+const Row kCostTitles = {"error", "worst", "bake, s", "core-s", "MB", "frame, ms", "read a frame, MB", "probes"};
 
 Row joined(Row a, const Row& b) {
   a.insert(a.end(), b.begin(), b.end());
   return a;
 }
 
-/// The cheapest of a method's runs by `cost` that errs no more than `error`; nullptr: none.
-const Run* cheapest(const Evaluation& e, const std::string& method, double error, double (*cost)(const Run&)) {
-  const Run* best = nullptr;
+/// Of one method.
+std::vector<Cost> front_of(const Evaluation& e, const std::string& method, double (*cost)(const Run&)) {
+  std::vector<Cost> all, front;
   for (const Run& r : e.runs) {
-    if (r.method == method && r.error() <= error && (best == nullptr || cost(r) < cost(*best))) best = &r;
+    if (r.method == method && cost(r) > 0) all.push_back({cost(r), r.error()});
   }
-  return best;
+  for (const size_t i : pareto_front(all)) front.push_back(all[i]);
+  return front;
 }
 
-/// A method's run of least error that costs no more than `most`.
-const Run* most_accurate(const Evaluation& e, const std::string& method, double most, double (*cost)(const Run&)) {
-  const Run* best = nullptr;
-  for (const Run& r : e.runs) {
-    if (r.method == method && cost(r) <= most && (best == nullptr || r.error() < best->error())) best = &r;
-  }
-  return best;
-}
+double bytes_of(const Run& r) { return static_cast<double>(r.facts.bytes); }
+double core_seconds_of(const Run& r) { return r.facts.core_seconds; }
 
-std::string equals(const Evaluation& e) {
-  const Run& ours = e.runs.front();
-  const auto bytes = [](const Run& r) { return static_cast<double>(r.facts.bytes); };
-  const auto core = [](const Run& r) { return r.facts.core_seconds; };
-  const auto say = [](const Run* r, const std::string& figure) {
-    return r == nullptr ? std::string("none of its settings")
-                        : figure + " <small>" + escape_markup(r->label) + "</small>";
+const Row kEqualTitles = {"error in as many bytes", "MB for as small an error", "error in as many core-s",
+                          "core-s for as small an error"};
+/// What a method has where it costs as much, or errs as little, as `ours`.
+Row equals(const Evaluation& e, const std::string& method, const Run& ours) {
+  const auto say = [](const char* how, std::optional<double> value, double unit = 1) {
+    return value ? format(how, *value / unit) : std::string("–");
   };
-  std::vector<Row> rows;
-  for (const auto& m : e.methods) {
-    const Run* at_error = cheapest(e, m.name, ours.error(), bytes);
-    const Run* fast = cheapest(e, m.name, ours.error(), core);
-    const Run* at_bytes = most_accurate(e, m.name, bytes(ours), bytes);
-    const Run* at_time = most_accurate(e, m.name, ours.facts.core_seconds, core);
-    rows.push_back({escape_markup(m.title), say(at_bytes, at_bytes ? format("%.4f", at_bytes->error()) : ""),
-                    say(at_time, at_time ? format("%.4f", at_time->error()) : ""),
-                    say(at_error, at_error ? megabytes(bytes(*at_error)) + " MB" : ""),
-                    say(fast, fast ? format("%.1f", fast->facts.core_seconds) + " core-s" : "")});
-  }
-  return table({"method", "least error in as many bytes", "least error in as many core-seconds",
-                "least bytes for as small an error", "least core-seconds for as small an error"},
-               rows, 9);
+  const std::vector<Cost> bytes = front_of(e, method, bytes_of), core = front_of(e, method, core_seconds_of);
+  return {say("%.4f", error_at(bytes, bytes_of(ours))), say("%.3g", cost_at(bytes, ours.error()), 1e6),
+          say("%.4f", error_at(core, core_seconds_of(ours))), say("%.3g", cost_at(core, ours.error()))};
 }
 
 NamedChart expected_error_chart(const std::string& level, const ExpectedError& expected) {
@@ -187,6 +171,45 @@ absl::StatusOr<std::string> sheet_markup(const Page& page, const Sheet& sheet) {
            "</div><figcaption><b>" + escape_markup(p.title) + "</b>" + figure + "</figcaption></figure>\n";
   }
   return out + "</div>\n";
+}
+
+std::string rigs_markup(const Evaluation& e) {
+  Row head = {"rig", "truth's noise", "paths a texel"};
+  for (const auto& m : e.methods) head.push_back(escape_markup(m.title));
+  std::vector<Row> rows;
+  for (size_t i = 0; i < e.rigs.size(); ++i) {
+    Row row = {escape_markup(printable(e.rigs[i].name)), format("%.4f", e.rigs[i].noise),
+               std::to_string(e.rigs[i].samples)};
+    for (const auto& m : e.methods) {
+      const Run* run = default_run(e, m.name);
+      row.push_back(run != nullptr && i < run->rigs.size()
+                        ? format("%.4f", run->rigs[i].error()) + " <small>" +
+                              format("%+.1f %%", 100 * run->rigs[i].bias) + "</small>"
+                        : "–");
+    }
+    rows.push_back(std::move(row));
+  }
+  return "<h2>Rig by rig</h2>\n" + table(head, rows, 1) +
+         "<p><small>Error, and bias Σ(E − E<sub>truth</sub>) ÷ ΣE<sub>truth</sub>.</small></p>\n";
+}
+
+/// Of a pool: the errors of each level, and its own charts.
+std::string levels_markup(const Evaluation& pooled, const std::vector<Evaluation>& levels) {
+  Row head = {"level", "rigs", "receivers", "operator norm's rank correlation"};
+  for (const auto& m : pooled.methods) head.push_back(escape_markup(m.title));
+  std::vector<Row> rows;
+  std::string charts;
+  for (const Evaluation& e : levels) {
+    Row row = {escape_markup(printable(e.level)), std::to_string(e.rigs.size()), std::to_string(e.receivers),
+               e.expected ? format("%.2f", e.expected->own_correlation()) : "–"};
+    for (const auto& m : pooled.methods) row.push_back(format("%.4f", default_run(e, m.name)->error()));
+    rows.push_back(std::move(row));
+    charts += "<h3>" + escape_markup(printable(e.level)) + " <small>" + escape_markup(e.machine) +
+              "</small></h3>\n<div class=\"charts\">\n";
+    for (const NamedChart& c : make_charts(e, nullptr)) charts += chart_svg(c.chart);
+    charts += "</div>\n";
+  }
+  return "<h2>Level by level</h2>\n" + table(head, rows, 1) + charts;
 }
 
 std::string css_ramp() {
@@ -261,13 +284,20 @@ absl::StatusOr<Curve> read_curve(const std::filesystem::path& path) {
 std::vector<NamedChart> make_charts(const Evaluation& e, const Curve* curve) {
   std::vector<NamedChart> charts;
   for (const CostAxis& axis : kAxes) {
+    const bool pooled = !e.pooled.empty();
+    const double unit = pooled ? axis.of(e.runs.front()) : 1;
     NamedChart named{std::string("error-") + axis.name,
-                     {e.level + ": " + axis.title, axis.words, "error, geometric mean over the rigs", false, {}}};
+                     {e.level + ": " + axis.title,
+                      axis.words + std::string(pooled ? ", of our default's: geometric mean" : ""),
+                      pooled ? "error, geometric mean over the levels" : "error, geometric mean over the rigs",
+                      false,
+                      {}}};
     for (const auto& m : e.methods) {
       ChartSeries series{m.title, {}, false};
       for (const Run& r : e.runs) {
         if (r.method != m.name) continue;
-        series.points.push_back({axis.of(r), r.error(), words_of(r), &r == default_run(e, m.name)});
+        series.points.push_back(
+            {unit > 0 ? axis.of(r) / unit : 0, r.error(), words_of(r), &r == default_run(e, m.name)});
       }
       named.chart.series.push_back(std::move(series));
     }
@@ -318,8 +348,15 @@ absl::StatusOr<std::string> report_html(const Page& page) {
       escape_markup(e.level) + ": speed against accuracy</title>\n" + kStyle + "</head><body>\n";
   out += "<h1>" + escape_markup(e.level) + ": speed against accuracy</h1>\n<p>" + std::to_string(e.receivers) +
          " receivers, " + std::to_string(e.triangles) + " triangles, " + std::to_string(e.rigs.size()) +
-         " rigs of lights, " + std::to_string(e.bounces) + (e.bounces == 1 ? " bounce" : " bounces") + ". " +
-         escape_markup(e.machine) + ".<br><code>" + escape_markup(page.command) + "</code></p>\n";
+         (e.pooled.empty() ? " rigs of lights, " : " levels, ") + std::to_string(e.bounces) +
+         (e.bounces == 1 ? " bounce" : " bounces") + ". " + escape_markup(e.machine) + ".<br><code>" +
+         escape_markup(page.command) + "</code></p>\n";
+  if (!e.pooled.empty()) {
+    out +=
+        "<p><b>Pooled</b>: of each method the settings that all levels have, relative to its default there; error and "
+        "costs are "
+        "geometric means over the levels, in charts as multiples of our default's.</p>\n";
+  }
   out +=
       "<p><b>Error</b> is rel_rmse, ‖E − E<sub>truth</sub>‖ ÷ ‖E<sub>truth</sub>‖ over receiver texels, weighted by "
       "area, without the noise of the "
@@ -327,14 +364,20 @@ absl::StatusOr<std::string> report_html(const Page& page) {
       "thread of the processor, for every method.</p>\n";
 
   out += "<h2>At each method's default</h2>\n";
-  std::vector<Row> rows;
+  std::vector<Row> rows, equal;
   for (const auto& m : e.methods) {
     if (const Run* run = default_run(e, m.name)) {
-      rows.push_back(joined({"<b>" + escape_markup(m.title) + "</b>", escape_markup(run->label)}, costs_of(*run)));
+      const std::string title = "<b>" + escape_markup(m.title) + "</b>";
+      rows.push_back(joined({title, escape_markup(run->label)}, costs_of(*run)));
+      equal.push_back(joined({title}, equals(e, m.name, e.runs.front())));
     }
   }
   out += table(joined({"method", "settings"}, kCostTitles), rows, 2);
-  out += "<h3>Against what " + escape_markup(e.methods.front().title) + "'s default has</h3>\n" + equals(e);
+  out += "<h3>By all settings, against " + escape_markup(e.methods.front().title) + "'s default</h3>\n" +
+         table(joined({"method"}, kEqualTitles), equal, 1) +
+         "<p><small>Along the front of the method's own settings, straight between them in logarithms. –: none of them "
+         "is as "
+         "cheap, or as accurate.</small></p>\n";
 
   out += "<h2>Charts</h2>\n<div class=\"charts\">\n";
   for (const NamedChart& c : page.charts) out += chart_svg(c.chart);
@@ -369,24 +412,7 @@ absl::StatusOr<std::string> report_html(const Page& page) {
     }
   }
 
-  out += "<h2>Rig by rig</h2>\n";
-  Row head = {"rig", "truth's noise", "paths a texel"};
-  for (const auto& m : e.methods) head.push_back(escape_markup(m.title));
-  rows.clear();
-  for (size_t i = 0; i < e.rigs.size(); ++i) {
-    Row row = {escape_markup(printable(e.rigs[i].name)), format("%.4f", e.rigs[i].noise),
-               std::to_string(e.rigs[i].samples)};
-    for (const auto& m : e.methods) {
-      const Run* run = default_run(e, m.name);
-      row.push_back(run != nullptr && i < run->rigs.size()
-                        ? format("%.4f", run->rigs[i].error()) + " <small>" +
-                              format("%+.1f %%", 100 * run->rigs[i].bias) + "</small>"
-                        : "–");
-    }
-    rows.push_back(std::move(row));
-  }
-  out +=
-      table(head, rows, 1) + "<p><small>Error, and bias Σ(E − E<sub>truth</sub>) ÷ ΣE<sub>truth</sub>.</small></p>\n";
+  out += e.pooled.empty() ? rigs_markup(e) : levels_markup(e, page.levels);
 
   out += "<h2>Everything that was measured</h2>\n";
   rows.clear();

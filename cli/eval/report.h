@@ -24,7 +24,7 @@ struct NamedChart {
   std::string name;  ///< of a file
   Chart chart;
 };
-/// Error against each cost.
+/// Error against each cost; of a pool, as multiples of what our default's costs.
 std::vector<NamedChart> make_charts(const Evaluation& evaluation, const Curve* curve);
 
 /// Where a method's default is beaten in a chart's cost and in error at once, and by whom; empty: nowhere.
@@ -49,6 +49,7 @@ struct Page {
   const Curve* curve = nullptr;
   std::vector<StabilityRow> stability = {};
   std::string command;
+  std::vector<Evaluation> levels = {};  ///< that `evaluation` pools
 };
 /// Errors: pictures that cannot be read.
 absl::StatusOr<std::string> report_html(const Page& page);

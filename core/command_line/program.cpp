@@ -46,6 +46,9 @@ class Adder {
   void operator()(std::string* value) {
     app_->add_option(option_.name, *value, option_.help)->required(option_.required)->capture_default_str();
   }
+  void operator()(std::vector<std::string>* value) {
+    app_->add_option(option_.name, *value, option_.help)->required(option_.required);
+  }
   void operator()(const SizeOption& value) { quantity(value.bytes, parse_size, value.preset, "SIZE"); }
   void operator()(const TimeOption& value) { quantity(value.seconds, parse_seconds, value.preset, "TIME"); }
   template <class Number>

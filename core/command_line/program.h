@@ -27,10 +27,10 @@ struct TimeOption {
 struct Option {
   std::string name;  ///< "SCENE" positional, "-o,--output" or "--bounces"
   std::string help;
-  /// Holds the default; bool: a flag; optional: may be left out, and the help says what that means. Numbers are parsed
+  /// Holds the default; bool: a flag; vector: one or more, up to the next option; optional: may be left out, and the help says what that means. Numbers are parsed
   /// whole, and are finite.
-  std::variant<bool*, int*, uint32_t*, uint64_t*, float*, std::string*, std::optional<int>*, std::optional<uint64_t>*,
-               std::optional<float>*, SizeOption, TimeOption>
+  std::variant<bool*, int*, uint32_t*, uint64_t*, float*, std::string*, std::vector<std::string>*, std::optional<int>*,
+               std::optional<uint64_t>*, std::optional<float>*, SizeOption, TimeOption>
       value;
   bool required = false;
 };

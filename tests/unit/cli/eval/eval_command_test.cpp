@@ -53,8 +53,32 @@ TEST_F(EvalCommand, ChartsAndReportsAndGoesOnWhereItWas) {
   EXPECT_THAT(more.err, Not(HasSubstr("default, default")));
 }
 
+TEST_F(EvalCommand, PoolsLevels) {
+  ASSERT_EQ(run(small("default,static")).code, 0);
+  auto other = small("static,default");
+  other[3] = path("out2");
+  other.insert(other.end(), {"--name", "another"});
+  ASSERT_EQ(run(other).code, 0);
+  const Result pooled = run({"eval", "--pool", path("out"), path("out2"), "-o", path("pool"), "--json"});
+  ASSERT_EQ(pooled.code, 0) << pooled.err;
+  const auto report = nlohmann::json::parse(pooled.out);
+  const auto one = nlohmann::json::parse(run(small("default,static")).out);
+  EXPECT_EQ(report["level"], "2 levels");
+  // The same level twice: the mean is what each has.
+  EXPECT_NEAR(report["methods"]["default"]["rel_rmse_geomean"], one["methods"]["default"]["rel_rmse_geomean"], 1e-6);
+  EXPECT_EQ(report["methods"]["default"]["bytes"], one["methods"]["default"]["bytes"]);
+  EXPECT_THAT(text_of(path("pool/report.html")), HasSubstr("Level by level"));
+  for (const char* file : {"results.csv", "levels.csv", "error-bytes.svg"}) {
+    EXPECT_GT(text_of(path("pool/") + file).size(), 100u) << file;
+  }
+  fails(1, {"eval", "--pool", path("out"), path("out"), "-o", path("pool")}, "is there twice");
+}
+
 TEST_F(EvalCommand, SaysWhatIsWrongBeforeAnyWork) {
   fails(2, {"eval", scene_}, "--output is required");
+  fails(2, {"eval", "-o", path("o")}, "SCENE is required, or --pool");
+  fails(2, {"eval", scene_, "--pool", path("p"), "-o", path("o")}, "--pool goes without SCENE");
+  fails(1, {"eval", "--pool", path("p"), "-o", path("o")}, "evaluation.json");
   EXPECT_THAT(fails(2, {"eval", scene_, "-o", path("o"), "--methods", "default,best"}, "'best'"), HasSubstr("sl17"));
   fails(2, {"eval", scene_, "-o", path("o"), "--bounces", "0"}, "--bounces must be 1");
   fails(2, {"eval", scene_, "-o", path("o"), "--most-samples", "5"}, "--most-samples");

@@ -24,6 +24,19 @@ TEST(Pareto, AgreesWithItsDefinition) {
   }
 }
 
+TEST(Pareto, BetweenItsPointsAFrontIsStraightInLogarithms) {
+  const std::vector<Cost> front = {{1, 0.4}, {4, 0.1}, {8, 0.05}};
+  EXPECT_NEAR(*error_at(front, 2), 0.2, 1e-12);
+  EXPECT_EQ(*error_at(front, 4), 0.1);
+  EXPECT_EQ(*error_at(front, 100), 0.05);  // what is cheaper will do
+  EXPECT_FALSE(error_at(front, 0.9));
+  EXPECT_NEAR(*cost_at(front, 0.2), 2, 1e-12);
+  EXPECT_EQ(*cost_at(front, 0.05), 8);
+  EXPECT_EQ(*cost_at(front, 1), 1);
+  EXPECT_FALSE(cost_at(front, 0.04));
+  EXPECT_FALSE(error_at({}, 1));
+}
+
 TEST(Pareto, NothingHasNoFront) { EXPECT_TRUE(pareto_front({}).empty()); }
 
 }  // namespace

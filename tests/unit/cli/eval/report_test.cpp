@@ -55,7 +55,7 @@ TEST(Report, IsOnePageThatNeedsNothingElse) {
       {"lamp <1>", "the worst", {{"path traced", png, "", png, ""}, {"ours", png, png, png, png}}}};
   const auto charts = make_charts(e, nullptr);
   const Page page{
-      e, charts, sheets, nullptr, {{"walls", "leak & co", png, 2e-3, 1e-3, false}}, "lightloom eval hall.glb"};
+      e, charts, sheets, nullptr, {{"walls", "leak & co", png, 2e-3, 1e-3, false}}, "lightloom eval hall.glb", {}};
   const auto html = report_html(page);
   ASSERT_TRUE(html.ok()) << html.status();
   EXPECT_THAT(*html, HasSubstr("data:image/png;base64,iVBOR"));
