@@ -45,7 +45,12 @@ std::string percent_decoded(const std::string& uri) {
   return out;
 }
 
-/// Buffers and textures beside a .gltf. Whatever cannot be read names nothing: the loader will say why.
+absl::Status missing(const std::string& path, const std::string& mend) {
+  return absl::NotFoundError("there is no " + path + "; " + mend);
+}
+
+}  // namespace
+
 std::vector<std::string> linked_files(const std::string& gltf) {
   constexpr uintmax_t kMaxBytes = uintmax_t{256} << 20;
   std::error_code error;
@@ -66,12 +71,6 @@ std::vector<std::string> linked_files(const std::string& gltf) {
   [[maybe_unused]] const Json nothing = Json::parse(bytes->begin(), bytes->end(), collect, /*allow_exceptions=*/false);
   return files;
 }
-
-absl::Status missing(const std::string& path, const std::string& mend) {
-  return absl::NotFoundError("there is no " + path + "; " + mend);
-}
-
-}  // namespace
 
 absl::Status check_input(const std::string& path) {
   std::error_code error;

@@ -19,6 +19,9 @@ absl::Status check_input(const std::string& path);
 /// `path` is a folder with a manifest.
 absl::Status check_loom(const std::string& path);
 
+/// Buffers and textures beside a .gltf. Whatever cannot be read names nothing: the loader will say why.
+std::vector<std::string> linked_files(const std::string& gltf);
+
 class OutputCheck {
  public:
   /// `inputs`: files and .loom folders that the command reads; empty names are skipped. What a .gltf links to counts too.

@@ -80,6 +80,7 @@ class ShMethod : public Method {
  public:
   std::string name() const override { return "sh"; }
   std::string title() const override { return "plain SH probes"; }
+  std::string version() const override { return std::string(kBaselinesVersion); }
   std::string about() const override {
     return "Spatial interpolation alone, Silvennoinen & Lehtinen 2017, Eq. 1: radiance at a receiver is the weighted "
            "mean of "
@@ -111,6 +112,7 @@ class DdgiMethod : public Method {
  public:
   std::string name() const override { return "ddgi"; }
   std::string title() const override { return "DDGI probes"; }
+  std::string version() const override { return std::string(kBaselinesVersion); }
   std::string about() const override {
     return "Visibility-weighted irradiance probes, Majercik et al. 2019 and 2021, with the constants of NVIDIA's RTXGI "
            "SDK 1.2: a "

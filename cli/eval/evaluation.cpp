@@ -10,6 +10,7 @@
 #include "core/base/random_id.h"
 #include "core/base/version.h"
 #include "core/reference/compare.h"
+#include "core/reference/path_tracer.h"
 
 namespace lightloom::eval {
 namespace {
@@ -20,25 +21,30 @@ std::string file_name(const std::string& label) {
   return name;
 }
 
-/// All that a run's errors depend on, and how its times were taken.
+/// All that a run's errors depend on, and how its times were taken; not on which machine, which the run itself says.
 std::string key_of(const LitLevel& level, const Request& request, const Method& method, const Variant& variant) {
   Hasher h;
-  h.string("run").string(kMethodVersion).digest(level.digest()).string(method.name()).string(variant.label);
+  h.string("run").string(kMethodVersion).string(kReferenceVersion).string(method.version());
+  h.digest(level.digest()).string(method.name()).string(variant.label);
   for (const auto& [name, value] : variant.settings) h.string(name).value(value);
   const TruthOptions& t = request.truth;
   h.value(request.bounces).value(t.samples).value(t.most_samples).value(t.noise);
   h.value(level.plan().params.seed).value(level.threads());
+  h.value(level.plan().params.texels_per_metre).value(level.plan().params.lightmap_size);
   h.value(level.elements().layout.width).value(level.elements().layout.height);
+  if (method.has_frames()) h.value(request.frames);
   for (size_t i = 0; i < level.rigs(); ++i) h.string(level.name(i));
   return h.finish().hex();
 }
 
-std::string machine() {
+/// Processor and threads.
+std::string machine(int threads) {
+  const std::string on = ", " + std::to_string(thread_count(threads)) + " threads";
   std::ifstream file("/proc/cpuinfo");
   for (std::string line; std::getline(file, line);) {
-    if (line.starts_with("model name")) return line.substr(line.find(':') + 2);
+    if (line.starts_with("model name")) return line.substr(line.find(':') + 2) + on;
   }
-  return "unknown processor";
+  return "unknown processor" + on;
 }
 
 /// Pictures are made of them.
@@ -79,6 +85,7 @@ absl::Status measure(LitLevel* level, const Request& request, const Method& meth
   run->frame_ms.insert(run->frame_ms.end(), ms.begin(), ms.end());
   run->facts = model->facts();
   run->add_times(model->facts());
+  run->machines.insert(machine(level->threads()));
   return absl::OkStatus();
 }
 
@@ -102,7 +109,7 @@ const Run* default_run(const Evaluation& evaluation, const std::string& method) 
 absl::StatusOr<Evaluation> evaluate(LitLevel* level, const std::string& name, const Request& request) {
   Evaluation out;
   out.level = name;
-  out.machine = machine() + ", " + std::to_string(thread_count(level->threads())) + " threads";
+  out.machine = machine(level->threads());
   out.receivers = level->elements().receivers.all.size();
   for (const Object& o : level->scene().objects) out.triangles += o.triangles.size();
   out.bounces = request.bounces;

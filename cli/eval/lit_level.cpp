@@ -4,9 +4,11 @@
 
 #include <algorithm>
 
+#include "cli/files.h"
 #include "cli/interrupt.h"
 #include "core/base/file.h"
 #include "core/base/text.h"
+#include "core/base/version.h"
 #include "core/reference/path_tracer.h"
 #include "core/relight/lightmap.h"
 
@@ -35,6 +37,8 @@ Digest digest_of(const SurfaceElements& elements) {
 std::string key_of(const LitLevel& level, const std::string& rig, const TruthOptions& o) {
   Hasher h;
   h.string("truth").digest(level.digest()).string(rig).value(o.bounces).value(o.samples).value(o.most_samples);
+  h.string(kMethodVersion).string(kReferenceVersion);  // receivers follow from the one, E from the other
+  h.value(level.plan().params.texels_per_metre).value(level.plan().params.lightmap_size);
   h.value(o.noise).value(level.elements().layout.width).value(level.elements().layout.height);
   return h.finish().hex();
 }
@@ -50,6 +54,10 @@ absl::StatusOr<LitLevel> LitLevel::create(const std::string& scene, const std::s
   Hasher h;
   LL_ASSIGN_OR_RETURN(const auto scene_bytes, read_file(scene));
   h.digest(scene_hash(level.scene())).digest(sha256(scene_bytes));
+  for (const std::string& linked : linked_files(scene)) {
+    LL_ASSIGN_OR_RETURN(const auto linked_bytes, read_file(linked));
+    h.digest(sha256(linked_bytes));
+  }
   level.lights_ = level.scene().lights;
   for (const Material& m : level.scene().materials) level.emission_.push_back(m.emission);
   level.environment_ = level.scene().environment;

@@ -196,6 +196,7 @@ class TunedMethod : public Method {
  public:
   std::string name() const override { return "tuned"; }
   std::string title() const override { return "lightloom --error"; }
+  std::string version() const override { return std::string(kTunerVersion); }
   std::string about() const override {
     return "lightloom bake --error E: spacing, order, rays and rank chosen for a target, by lights of the level's own "
            "space. Its seconds include the choice.";

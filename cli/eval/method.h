@@ -50,6 +50,10 @@ class Method {
   virtual std::string name() const = 0;   ///< as --methods has it
   virtual std::string title() const = 0;  ///< in a chart
   virtual std::string about() const = 0;  ///< how it is done here, and from what source
+  /// Of what its results are computed by, besides the bake: remembered results of another one are measured again.
+  virtual std::string version() const { return ""; }
+  /// False: its light cannot change, so it has no frames.
+  virtual bool has_frames() const { return true; }
   /// Its own default first.
   virtual std::vector<Variant> sweep(const LitLevel& level, bool quick) const = 0;
   /// `scratch`: a folder for it alone, while the model lives. It refers to the level.

@@ -6,6 +6,7 @@
 
 #include <cstdio>
 #include <functional>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 
@@ -173,6 +174,24 @@ absl::StatusOr<std::string> sheet_markup(const Page& page, const Sheet& sheet) {
   return out + "</div>\n";
 }
 
+/// Errors hold on any machine; times do not.
+std::string other_machines(const Evaluation& e) {
+  std::map<std::string, std::string> runs;
+  for (const Run& r : e.runs) {
+    for (const std::string& machine : r.machines) {
+      std::string& all = runs[machine];
+      if (machine != e.machine) all += (all.empty() ? "" : "; ") + title_of(e, r.method) + ", " + r.label;
+    }
+  }
+  std::string out;
+  for (const auto& [machine, all] : runs) {
+    if (all.empty()) continue;
+    out += "<p class=\"bad\"><b>Times taken on another machine</b>, " + escape_markup(printable(machine)) + ": " +
+           escape_markup(all) + ".</p>\n";
+  }
+  return out;
+}
+
 std::string rigs_markup(const Evaluation& e) {
   Row head = {"rig", "truth's noise", "paths a texel"};
   for (const auto& m : e.methods) head.push_back(escape_markup(m.title));
@@ -204,8 +223,8 @@ std::string levels_markup(const Evaluation& pooled, const std::vector<Evaluation
                e.expected ? format("%.2f", e.expected->own_correlation()) : "–"};
     for (const auto& m : pooled.methods) row.push_back(format("%.4f", default_run(e, m.name)->error()));
     rows.push_back(std::move(row));
-    charts += "<h3>" + escape_markup(printable(e.level)) + " <small>" + escape_markup(e.machine) +
-              "</small></h3>\n<div class=\"charts\">\n";
+    charts += "<h3>" + escape_markup(printable(e.level)) + " <small>" + escape_markup(e.machine) + "</small></h3>\n" +
+              other_machines(e) + "<div class=\"charts\">\n";
     for (const NamedChart& c : make_charts(e, nullptr)) charts += chart_svg(c.chart);
     charts += "</div>\n";
   }
@@ -351,6 +370,7 @@ absl::StatusOr<std::string> report_html(const Page& page) {
          (e.pooled.empty() ? " rigs of lights, " : " levels, ") + std::to_string(e.bounces) +
          (e.bounces == 1 ? " bounce" : " bounces") + ". " + escape_markup(e.machine) + ".<br><code>" +
          escape_markup(page.command) + "</code></p>\n";
+  out += other_machines(e);
   if (!e.pooled.empty()) {
     out +=
         "<p><b>Pooled</b>: of each method the settings that all levels have, relative to its default there; error and "

@@ -78,7 +78,8 @@ nlohmann::json to_json(const Run& run) {
           {"frame_bytes", run.facts.frame_bytes},
           {"probes", run.facts.probes},
           {"frame_ms", run.frame_ms},
-          {"rigs", rigs}};
+          {"rigs", rigs},
+          {"machines", run.machines}};
 }
 
 Run run_from_json(const nlohmann::json& json) {
@@ -96,6 +97,7 @@ Run run_from_json(const nlohmann::json& json) {
   run.facts.seconds = median(run.seconds);
   run.facts.core_seconds = median(run.core_seconds);
   run.frame_ms = json.at("frame_ms").get<std::vector<double>>();
+  run.machines = json.value("machines", std::set<std::string>());
   for (const auto& r : json.at("rigs")) {
     run.rigs.push_back(
         {r.at("rig"), r.at("rel_rmse"), r.at("noise"), r.at("bias"), r.at("p50"), r.at("p95"), r.at("p99")});

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -31,6 +32,7 @@ struct Run {
   std::vector<double> seconds, core_seconds;
   std::vector<double> frame_ms;  ///< each frame
   std::vector<RigError> rigs;
+  std::set<std::string> machines;  ///< that times were taken on
 
   /// Geometric mean over the rigs.
   double error() const;

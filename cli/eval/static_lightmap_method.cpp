@@ -51,6 +51,8 @@ class StaticLightmapMethod : public Method {
  public:
   std::string name() const override { return "static"; }
   std::string title() const override { return "static lightmap (1 rig)"; }
+  std::string version() const override { return std::string(kReferenceVersion); }
+  bool has_frames() const override { return false; }
   std::string about() const override {
     return "E path traced at every texel for one rig of lights (lightloom reference): nothing may move, and each rig "
            "is a bake "

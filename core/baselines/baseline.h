@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "core/base/parallel.h"
@@ -15,6 +16,9 @@
 #include "core/relight/surface_inputs.h"
 
 namespace lightloom {
+
+/// Changes with any change of a baseline's E, bytes or work per frame: what is remembered of them does not hold then.
+inline constexpr std::string_view kBaselinesVersion = "1";
 
 /// Milliseconds of a frame's passes, summed over the frames.
 struct FrameTimes {

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string_view>
 
 #include "core/base/parallel.h"
 #include "core/base/sampling.h"
@@ -15,6 +16,9 @@
 #include "core/scene/ray_tracer.h"
 
 namespace lightloom {
+
+/// Changes with any change of E beyond noise, or of the noise: what is remembered of the truth does not hold then.
+inline constexpr std::string_view kReferenceVersion = "1";
 
 struct ReferenceOptions {
   int bounces = 1;

@@ -4,10 +4,14 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "core/bake/plan.h"
 
 namespace lightloom {
+
+/// Changes with any change of what is chosen. Choices that are on record hold without it; what is remembered of the tuner's does not.
+inline constexpr std::string_view kTunerVersion = "1";
 
 /// One of them is set.
 struct TuneTarget {

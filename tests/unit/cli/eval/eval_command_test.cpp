@@ -1,4 +1,5 @@
 // `lightloom eval` and `lightloom bake --error` as users run them.
+#include <cstring>
 #include <nlohmann/json.hpp>
 
 #include "core/asset/asset.h"
@@ -51,6 +52,37 @@ TEST_F(EvalCommand, ChartsAndReportsAndGoesOnWhereItWas) {
   ASSERT_EQ(more.code, 0) << more.err;
   EXPECT_THAT(more.err, HasSubstr("ddgi"));
   EXPECT_THAT(more.err, Not(HasSubstr("default, default")));
+}
+
+TEST_F(EvalCommand, MeasuresAgainWhatNoLongerHolds) {
+  // The level as .gltf with its buffer beside it.
+  const std::string glb = text_of(scene_);
+  const auto word = [&](size_t at) {
+    uint32_t value = 0;
+    std::memcpy(&value, glb.data() + at, 4);
+    return value;
+  };
+  const size_t json_bytes = word(12), bin_at = 20 + json_bytes + 8;
+  auto gltf = nlohmann::json::parse(glb.substr(20, json_bytes));
+  gltf["buffers"][0]["uri"] = "level.bin";
+  const std::string bin = glb.substr(bin_at, word(20 + json_bytes));
+  gltf["buffers"][0]["byteLength"] = bin.size() + 1;
+  write(path("level.gltf"), gltf.dump());
+  write(path("level.bin"), bin + "a");
+
+  auto command = small("default,static");
+  command[1] = path("level.gltf");
+  const auto measured = [&] {
+    const Result r = run(command);
+    EXPECT_EQ(r.code, 0) << r.err;
+    return r.err;
+  };
+  EXPECT_THAT(measured(), HasSubstr("default, default"));
+  EXPECT_THAT(measured(), Not(HasSubstr(" of ")));
+  write(path("level.bin"), bin + "b");
+  EXPECT_THAT(measured(), ::testing::AllOf(HasSubstr("default, default"), HasSubstr("static, 256")));
+  *std::find(command.begin(), command.end(), "2") = "3";  // --frames
+  EXPECT_THAT(measured(), ::testing::AllOf(HasSubstr("default, default"), Not(HasSubstr("static, 256"))));
 }
 
 TEST_F(EvalCommand, PoolsLevels) {

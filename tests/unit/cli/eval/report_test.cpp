@@ -66,6 +66,16 @@ TEST(Report, IsOnePageThatNeedsNothingElse) {
   for (const char* outside : {"<script", "src=\"http", "href=", "url("}) EXPECT_THAT(*html, Not(HasSubstr(outside)));
 }
 
+TEST(Report, SaysWhichTimesAreOfAnotherMachine) {
+  Evaluation e = example();
+  e.machine = "new, 2 threads";
+  for (auto& r : e.runs) r.machines = {e.machine};
+  const auto html = [&] { return report_html({e, {}, {}, nullptr, {}, "", {}}).value(); };
+  EXPECT_THAT(html(), Not(HasSubstr("another machine")));
+  e.runs[2].machines.insert("old, 4 threads");
+  EXPECT_THAT(html(), HasSubstr("another machine</b>, old, 4 threads: theirs, default.</p>"));
+}
+
 TEST(Report, ComesBackFromDisk) {
   const test::TemporaryFolder folder;
   const auto path = folder.path() / "evaluation.json";
@@ -121,6 +131,20 @@ TEST(Chart, OfExpectedErrorsHasTheirMedians) {
   const std::string svg = chart_svg(charts.back().chart);
   EXPECT_THAT(svg, HasSubstr("norm 0.055, error 0.0055"));
   EXPECT_THAT(svg, Not(HasSubstr("Pareto")));
+}
+
+TEST(Curve, ThoseOnRecordAreReadable) {
+  int count = 0;
+  for (const auto& file : std::filesystem::directory_iterator(LIGHTLOOM_SOURCE_DIR "/docs/results/cycles")) {
+    const auto curve = read_curve(file.path());
+    ASSERT_TRUE(curve.ok()) << curve.status();
+    EXPECT_GT(curve->points.size(), 2u) << file.path();
+    for (size_t i = 1; i < curve->points.size(); ++i) {
+      EXPECT_LT(curve->points[i].y, curve->points[i - 1].y) << file.path();  // more samples, less error
+    }
+    ++count;
+  }
+  EXPECT_EQ(count, 5);
 }
 
 TEST(Curve, IsReadLineByLine) {

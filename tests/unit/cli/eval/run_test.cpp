@@ -26,6 +26,7 @@ Run example() {
     run.add_times(one);
   }
   run.frame_ms = {4, 1, 2, 3};
+  run.machines = {"M, 2 threads"};
   run.rigs = {{"a", 0.05, 0.03, 0.01, 0.1, 0.2, 0.3}, {"b,c", 0.16, 0, 0, 0, 0, 0}};
   return run;
 }
@@ -56,6 +57,7 @@ TEST(Run, ComesBackFromDiskWhereItFits) {
   ASSERT_TRUE(back);
   EXPECT_EQ(results_csv("x", {*back}), results_csv("x", {example()}));
   EXPECT_EQ(rigs_csv("x", {*back}), rigs_csv("x", {example()}));
+  EXPECT_EQ(back->machines, example().machines);
   EXPECT_FALSE(load_run(path, "another"));
   ASSERT_TRUE(write_file_atomic(path, "{\"key\": \"k\"").ok());
   EXPECT_FALSE(load_run(path, "k"));
