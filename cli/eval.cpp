@@ -85,6 +85,14 @@ absl::Status check(const Options& o) {
   return OutputCheck({o.scene, o.lights, o.curve}).file("-o", o.output + "/report.html", {".html"});
 }
 
+nlohmann::json at_equal(const Equals& e) {
+  const auto or_null = [](std::optional<double> value) { return value ? nlohmann::json(*value) : nlohmann::json(); };
+  return {{"error_in_bytes", or_null(e.error_in_bytes)},
+          {"bytes_for_error", or_null(e.bytes_for_error)},
+          {"error_in_core_seconds", or_null(e.error_in_core_seconds)},
+          {"core_seconds_for_error", or_null(e.core_seconds_for_error)}};
+}
+
 nlohmann::json to_json(const Evaluation& e) {
   nlohmann::json methods = nlohmann::json::object();
   for (const auto& m : e.methods) {
@@ -92,16 +100,19 @@ nlohmann::json to_json(const Evaluation& e) {
     if (run == nullptr) continue;
     nlohmann::json beaten_in = nlohmann::json::array();
     for (const Beaten& b : beaten(e, *run)) beaten_in.push_back(b.cost);
-    methods[m.name] = {{"rel_rmse_geomean", run->error()},
+    methods[m.name] = {{"title", m.title},
+                       {"rel_rmse_geomean", run->error()},
                        {"rel_rmse_worst", run->worst()},
                        {"seconds", {{"total", run->facts.seconds}, {"core", run->facts.core_seconds}}},
                        {"bytes", {{"total", run->facts.bytes}, {"frame", run->facts.frame_bytes}}},
                        {"frame_ms", run->frame()},
                        {"probes", run->facts.probes},
+                       {"order", methods.size()},
+                       {"at_equal", at_equal(equals(e, m.name))},
                        {"beaten_in", beaten_in}};
   }
-  nlohmann::json out = {
-      {"level", e.level}, {"receivers", e.receivers}, {"variants", e.runs.size()}, {"methods", methods}};
+  nlohmann::json out = {{"level", e.level},         {"machine", e.machine},      {"rigs", e.rigs.size()},
+                        {"receivers", e.receivers}, {"variants", e.runs.size()}, {"methods", methods}};
   if (e.expected) {
     out["operator_norm_rank_correlation"] = {{"relative_to_own_light", e.expected->own_correlation()},
                                              {"relative_to_mean", e.expected->correlation()}};

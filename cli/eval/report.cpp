@@ -107,14 +107,12 @@ double core_seconds_of(const Run& r) { return r.facts.core_seconds; }
 
 const Row kEqualTitles = {"error in as many bytes", "MB for as small an error", "error in as many core-s",
                           "core-s for as small an error"};
-/// What a method has where it costs as much, or errs as little, as `ours`.
-Row equals(const Evaluation& e, const std::string& method, const Run& ours) {
+Row row_of(const Equals& equal) {
   const auto say = [](const char* how, std::optional<double> value, double unit = 1) {
     return value ? format(how, *value / unit) : std::string("–");
   };
-  const std::vector<Cost> bytes = front_of(e, method, bytes_of), core = front_of(e, method, core_seconds_of);
-  return {say("%.4f", error_at(bytes, bytes_of(ours))), say("%.3g", cost_at(bytes, ours.error()), 1e6),
-          say("%.4f", error_at(core, core_seconds_of(ours))), say("%.3g", cost_at(core, ours.error()))};
+  return {say("%.4f", equal.error_in_bytes), say("%.3g", equal.bytes_for_error, 1e6),
+          say("%.4f", equal.error_in_core_seconds), say("%.3g", equal.core_seconds_for_error)};
 }
 
 NamedChart expected_error_chart(const std::string& level, const ExpectedError& expected) {
@@ -329,6 +327,13 @@ std::vector<NamedChart> make_charts(const Evaluation& e, const Curve* curve) {
   return charts;
 }
 
+Equals equals(const Evaluation& e, const std::string& method) {
+  const Run& first = e.runs.front();
+  const std::vector<Cost> bytes = front_of(e, method, bytes_of), core = front_of(e, method, core_seconds_of);
+  return {error_at(bytes, bytes_of(first)), cost_at(bytes, first.error()), error_at(core, core_seconds_of(first)),
+          cost_at(core, first.error())};
+}
+
 std::vector<Beaten> beaten(const Evaluation& e, const Run& run) {
   std::vector<Beaten> out;
   for (const CostAxis& axis : kAxes) {
@@ -389,7 +394,7 @@ absl::StatusOr<std::string> report_html(const Page& page) {
     if (const Run* run = default_run(e, m.name)) {
       const std::string title = "<b>" + escape_markup(m.title) + "</b>";
       rows.push_back(joined({title, escape_markup(run->label)}, costs_of(*run)));
-      equal.push_back(joined({title}, equals(e, m.name, e.runs.front())));
+      equal.push_back(joined({title}, row_of(equals(e, m.name))));
     }
   }
   out += table(joined({"method", "settings"}, kCostTitles), rows, 2);

@@ -1,6 +1,7 @@
 // An evaluation as a page that needs no network, and as charts.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,13 @@ struct NamedChart {
 };
 /// Error against each cost; of a pool, as multiples of what our default's costs.
 std::vector<NamedChart> make_charts(const Evaluation& evaluation, const Curve* curve);
+
+/// What a method has where it costs as much, or errs as little, as the default of the first one: along the front of its own
+/// settings, between them by interpolation. None where none of them is as cheap, or as accurate.
+struct Equals {
+  std::optional<double> error_in_bytes, bytes_for_error, error_in_core_seconds, core_seconds_for_error;
+};
+Equals equals(const Evaluation& evaluation, const std::string& method);
 
 /// Where a method's default is beaten in a chart's cost and in error at once, and by whom; empty: nowhere.
 struct Beaten {

@@ -45,6 +45,18 @@ TEST(Report, SaysWhereAndByWhomTheDefaultIsBeaten) {
   EXPECT_THAT(beaten(e, e.runs[2]), IsEmpty());
 }
 
+TEST(Report, SaysWhatEachMethodHasForAsMuch) {
+  const Evaluation e = example();  // ours: 0.05 in 2000 bytes, 0.1 in 900
+  const Equals ours = equals(e, "default"), other = equals(e, "other"), fixed = equals(e, "static");
+  EXPECT_NEAR(*ours.error_in_bytes, 0.05, 1e-12);
+  EXPECT_EQ(ours.bytes_for_error, 2000);
+  EXPECT_NEAR(*other.error_in_bytes, 0.04, 1e-12);
+  EXPECT_EQ(other.bytes_for_error, 1000);
+  EXPECT_EQ(other.error_in_core_seconds, std::nullopt);
+  EXPECT_NEAR(*fixed.error_in_bytes, 0.2, 1e-12);
+  EXPECT_EQ(fixed.bytes_for_error, std::nullopt);
+}
+
 TEST(Report, IsOnePageThatNeedsNothingElse) {
   const test::TemporaryFolder folder;
   Image image(4, 4, {"R", "G", "B"});
