@@ -190,7 +190,8 @@ std::string chart_svg(const Chart& chart) {
   if (!line.empty()) {
     out += "<path d=\"" + line + "\" fill=\"none\" stroke=\"#bbb\" stroke-width=\"5\" stroke-linejoin=\"round\"/>\n";
   }
-  for (size_t i = chart.series.size(); i-- > 0;) {  // ours last, on top; lines over dots
+  const auto style = [&](size_t s) { return chart.scatter ? 2 * s : s; };  // two series, of unlike colours
+  for (size_t i = chart.series.size(); i-- > 0;) {                         // ours last, on top; lines over dots
     const size_t s = chart.scatter ? chart.series.size() - 1 - i : i;
     std::string joined, scattered;
     for (size_t p = 0; p < chart.series[s].points.size(); ++p) {
@@ -205,11 +206,12 @@ std::string chart_svg(const Chart& chart) {
       if (point.is_default) {
         out += "<circle cx=\"" + number(px) + "\" cy=\"" + number(py) + "\" r=\"9\" fill=\"none\" stroke=\"#222\"/>\n";
       }
-      out += mark(s, px, py, best[s][p] || chart.series[s].joined, chart.series[s].title + ", " + point.words) + "\n";
+      out += mark(style(s), px, py, best[s][p] || chart.series[s].joined, chart.series[s].title + ", " + point.words) +
+             "\n";
     }
-    if (!scattered.empty()) out += dots(s, scattered);
+    if (!scattered.empty()) out += dots(style(s), scattered);
     if (!joined.empty()) {
-      out += "<path d=\"" + joined + "\" fill=\"none\" stroke=\"" + kColours[s % std::size(kColours)] +
+      out += "<path d=\"" + joined + "\" fill=\"none\" stroke=\"" + kColours[style(s) % std::size(kColours)] +
              "\" stroke-dasharray=\"4 3\"/>\n";
     }
   }
@@ -217,7 +219,7 @@ std::string chart_svg(const Chart& chart) {
   for (size_t s = 0; s < chart.series.size(); ++s) {
     const double wide = 34 + 6.6 * static_cast<double>(chart.series[s].title.size());
     if (left + wide > kWidth && left > kLeft) left = kLeft, row += 18;
-    out += mark(s, left + 6, row, true, chart.series[s].title);
+    out += mark(style(s), left + 6, row, true, chart.series[s].title);
     out += text(left + 16, row + 4, chart.series[s].title);
     left += wide;
   }

@@ -134,12 +134,12 @@ NamedChart expected_error_chart(const std::string& level, const ExpectedError& e
 std::string expected_error_words(const ExpectedError& x) {
   return "<p>Where errors are to be expected, whatever the light: SL17's operator norm (Eq. 12, a receiver's light "
          "projected to its probes and back) of the default settings has, over " +
-         std::to_string(x.norm.size()) + " receivers, the <b>rank correlation " + format("%.2f", x.own_correlation()) +
+         std::to_string(x.norm.size()) + " receivers that any rig lights, the <b>rank correlation " +
+         format("%.2f", x.own_correlation()) +
          "</b> (Spearman) with the error relative to what the receiver gets over all rigs, and " +
          format("%.2f", x.correlation()) +
-         " with |ΔE| relative to the level's mean E, which is as large as the receiver is bright. The truth's own "
-         "noise, "
-         "which no norm foresees, is " +
+         " with |ΔE| relative to the level's mean E, which is larger where the receiver is brighter. The truth's own "
+         "noise, which no norm foresees, is " +
          format("%.0f", 100 * x.noise) + " % of the squared error, and lowers both.</p>\n";
 }
 
