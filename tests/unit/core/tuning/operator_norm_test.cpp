@@ -74,7 +74,7 @@ TEST(OperatorNorm, OfWhatNoProbeSeesIsOne) {
 TEST(OperatorNorm, FallsWithMoreProbesAndHigherOrders) {
   PlannedLevel coarse(test::room_with_crate(), 4, 2), fine(test::room_with_crate(), 1, 2);
   const auto of = [](const PlannedLevel& level) {
-    return mean(norms(level, stratified(front_receivers(level.plan.receivers), 24, 1)));
+    return mean(norms(level, stratified(front_receivers(level.plan.receivers), 12, 1)));
   };
   const double many = of(fine), few = of(coarse);
   EXPECT_LT(many, 0.7 * few);
