@@ -232,19 +232,37 @@ absl::StatusOr<std::vector<uint32_t>> AssetIndex::elements(const CellChunk& chun
 
 absl::StatusOr<std::vector<uint32_t>> AssetIndex::elements(const RelightChunk& chunk, std::span<const uint32_t> objects,
                                                            std::span<const SurfaceKeys> keys) const {
-  // First ray code of each object, then of none.
-  std::vector<uint64_t> base = {0};
-  for (const ChunkObject& o : chunk.objects) base.push_back(base.back() + 2ull * o.width * o.height);
   std::vector<uint32_t> rays = chunk.rays;
-  for (uint32_t& ray : rays) {
-    if (ray == RelightChunk::kDead || ray == RelightChunk::kSky) continue;
-    const auto after = std::upper_bound(base.begin(), base.end(), ray);
-    const size_t slot = static_cast<size_t>(after - base.begin()) - 1;
-    const size_t at = find_key(*keys[slot], static_cast<uint32_t>(ray - base[slot]));
-    if (at == keys[slot]->size()) return corrupt("relight set", "a ray ends at no texel of its object's surface");
-    ray = objects_[objects[slot]].first_element + static_cast<uint32_t>(at);
+  if (!to_elements(chunk.objects, objects, keys, &rays)) {
+    return corrupt("relight set", "a ray ends at no texel of its object's surface");
   }
   return rays;
+}
+
+absl::StatusOr<std::vector<uint32_t>> AssetIndex::near_elements(const CellChunk& chunk,
+                                                                std::span<const uint32_t> objects,
+                                                                std::span<const SurfaceKeys> keys) const {
+  std::vector<uint32_t> texels = chunk.near_texels;
+  if (!to_elements(chunk.objects, objects, keys, &texels)) {
+    return corrupt("cell", "a near texel is no texel of its object's surface");
+  }
+  return texels;
+}
+
+bool AssetIndex::to_elements(const std::vector<ChunkObject>& named, std::span<const uint32_t> objects,
+                             std::span<const SurfaceKeys> keys, std::vector<uint32_t>* texels) const {
+  // First code of each object, then of none.
+  std::vector<uint64_t> base = {0};
+  for (const ChunkObject& o : named) base.push_back(base.back() + 2ull * o.width * o.height);
+  for (uint32_t& texel : *texels) {
+    if (texel == RelightChunk::kDead || texel == RelightChunk::kSky) continue;
+    const auto after = std::upper_bound(base.begin(), base.end(), texel);
+    const size_t slot = static_cast<size_t>(after - base.begin()) - 1;
+    const size_t at = find_key(*keys[slot], static_cast<uint32_t>(texel - base[slot]));
+    if (at == keys[slot]->size()) return false;
+    texel = objects_[objects[slot]].first_element + static_cast<uint32_t>(at);
+  }
+  return true;
 }
 
 }  // namespace lightloom

@@ -97,6 +97,9 @@ class AssetIndex {
                                                  std::span<const SurfaceKeys> keys) const;
   absl::StatusOr<std::vector<uint32_t>> elements(const RelightChunk& chunk, std::span<const uint32_t> objects,
                                                  std::span<const SurfaceKeys> keys) const;
+  /// Likewise, of CellChunk::near_texels.
+  absl::StatusOr<std::vector<uint32_t>> near_elements(const CellChunk& chunk, std::span<const uint32_t> objects,
+                                                      std::span<const SurfaceKeys> keys) const;
 
  private:
   explicit AssetIndex(std::pmr::memory_resource* memory)
@@ -110,6 +113,9 @@ class AssetIndex {
         probe_cells_(memory),
         by_digest_(memory) {}
   absl::Status add_objects(const Manifest& manifest);
+  /// Codes of RelightChunk::rays to elements; false if one is no texel of its object's surface.
+  bool to_elements(const std::vector<ChunkObject>& named, std::span<const uint32_t> objects,
+                   std::span<const SurfaceKeys> keys, std::vector<uint32_t>* texels) const;
   void list_cells_of_probes();
   absl::Status sort_digests();
 

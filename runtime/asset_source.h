@@ -19,8 +19,9 @@ using ReadChunk = std::function<absl::Status(const ChunkRef& ref, std::span<uint
 /// A bake cell whose receivers are surface elements.
 struct SourceCell {
   CellChunk chunk;
-  std::vector<uint32_t> elements;  ///< per receiver
-  std::vector<uint32_t> probes;    ///< the cell's probe list: indices into Manifest::probes
+  std::vector<uint32_t> elements;       ///< per receiver
+  std::vector<uint32_t> near_elements;  ///< of CellChunk::near_texels
+  std::vector<uint32_t> probes;         ///< the cell's probe list: indices into Manifest::probes
 };
 
 /// Marks the cell's receivers in `received` (S). DataLoss if one is marked already: no two receivers may

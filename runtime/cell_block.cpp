@@ -18,7 +18,7 @@ uint32_t jobs_of(uint32_t rank) { return std::max(1u, (rank + gpu::kJobColumns -
 
 /// Where each array of a block lies, bytes.
 struct Places {
-  uint64_t clusters, jobs, probes, corrections, octets, elements, uniforms, matrix, coefficients, end;
+  uint64_t clusters, jobs, probes, corrections, octets, elements, uniforms, near_first, near, matrix, coefficients, end;
 };
 
 Places places_of(const SourceCell& cell) {
@@ -44,6 +44,8 @@ Places places_of(const SourceCell& cell) {
   p.octets = place(octets * sizeof(gpu::Octet));
   p.elements = place(octets * gpu::kOctet * sizeof(uint32_t));
   p.uniforms = place(octets * gpu::kOctet * sizeof(uint16_t));
+  p.near_first = place((octets * gpu::kOctet + 1) * sizeof(uint32_t));
+  p.near = place(cell.near_elements.size() * sizeof(gpu::NearTexel));
   p.matrix = place(halfs * sizeof(Half));
   p.coefficients = place((ranks + cell.chunk.clusters.size()) * 4 * sizeof(float));
   p.end = at;
@@ -90,13 +92,16 @@ absl::StatusOr<CellBlock> make_cell_block(const SourceCell& cell, uint64_t max_b
                                    units(at.uniforms, 16),
                                    units(at.coefficients, 16),
                                    static_cast<uint32_t>(sh_stride(static_cast<int>(cell.chunk.order))) / 8,
+                                   units(at.near_first, 4),
+                                   units(at.near, 4),
                                    {}});
   Writer clusters(data + at.clusters), jobs(data + at.jobs), probes(data + at.probes);
   Writer corrections(data + at.corrections), octets(data + at.octets), elements(data + at.elements);
-  Writer uniforms(data + at.uniforms), matrix(data + at.matrix);
+  Writer uniforms(data + at.uniforms), near_first(data + at.near_first), near(data + at.near), matrix(data + at.matrix);
 
   uint32_t index = 0, first_probe = 0, first_correction = 0, first_coefficient = 0;
-  uint32_t quad = units(at.matrix, 16);
+  uint32_t quad = units(at.matrix, 16), near_end = 0;
+  near_first.put(near_end);
   for (const CellChunk::Cluster& c : cell.chunk.clusters) {
     const uint32_t count = octets_of(c.receivers);
     const uint32_t projection = static_cast<uint32_t>(c.projection.size() / 8);
@@ -115,6 +120,14 @@ absl::StatusOr<CellBlock> make_cell_block(const SourceCell& cell, uint64_t max_b
     for (uint32_t pad = c.receivers; pad < count * gpu::kOctet; ++pad) elements.put(gpu::kNoElement);
     uniforms.put(cell.chunk.uniform.data() + c.first_receiver, c.receivers);
     uniforms.skip((count * gpu::kOctet - c.receivers) * sizeof(uint16_t));
+    for (uint32_t r = 0; r < count * gpu::kOctet; ++r) {
+      const uint32_t entries = r < c.receivers ? cell.chunk.near_counts[c.first_receiver + r] : 0;
+      for (const uint32_t end = near_end + entries; near_end < end; ++near_end) {
+        near.put(gpu::NearTexel{cell.near_elements[near_end],
+                                kPi / 65535 * static_cast<float>(cell.chunk.near_weights[near_end])});
+      }
+      near_first.put(near_end);
+    }
     matrix.put(c.projection.data(), c.projection.size());
     matrix.put(c.reconstruction.data(), c.reconstruction.size());
 

@@ -62,8 +62,9 @@ std::vector<Rgb> project(const SourceCell& cell, const CellChunk::Cluster& clust
   return c;
 }
 
+/// `near`: the first entry of the cluster's near fields; becomes that of the next one's.
 void receive(const SourceCell& cell, const CellChunk::Cluster& cluster, const std::vector<Rgb>& c,
-             std::span<Vec3> irradiance) {
+             std::span<const Vec3> radiosity, size_t* near, std::span<Vec3> irradiance) {
   const size_t padded = (cluster.receivers + 7) / 8 * size_t{8};
   for (size_t r = 0; r < cluster.receivers; ++r) {
     const size_t receiver = cluster.first_receiver + r;
@@ -71,6 +72,9 @@ void receive(const SourceCell& cell, const CellChunk::Cluster& cluster, const st
     add(&e, kPiD * cell.chunk.uniform[receiver] / 65535, c[0]);
     for (size_t k = 1; k < c.size(); ++k) {
       add(&e, static_cast<double>(half_to_float(cluster.reconstruction[(k - 1) * padded + r])), c[k]);
+    }
+    for (const size_t end = *near + cell.chunk.near_counts[receiver]; *near < end; ++*near) {
+      add(&e, kPiD * cell.chunk.near_weights[*near] / 65535, radiosity[cell.near_elements[*near]]);
     }
     irradiance[cell.elements[receiver]] = rounded(e);
   }
@@ -126,8 +130,10 @@ DecodedFrame decode_frame(const DecoderAsset& asset, const SurfaceLight& light, 
   frame.irradiance.resize(S);
   parallel_for(asset.cells.size(), how, [&](uint64_t i) {
     const SourceCell& cell = asset.cells[i];
+    size_t near = 0;
     for (const CellChunk::Cluster& cluster : cell.chunk.clusters) {
-      receive(cell, cluster, project(cell, cluster, asset.order, frame.lambda), frame.irradiance);
+      receive(cell, cluster, project(cell, cluster, asset.order, frame.lambda), frame.radiosity, &near,
+              frame.irradiance);
     }
   });
   return frame;

@@ -38,6 +38,7 @@ absl::StatusOr<SourceCell> resolve_cell(const AssetIndex& index, uint32_t cell, 
   LL_ASSIGN_OR_RETURN(const std::vector<uint32_t> objects, index.objects_of(out.chunk.objects));
   LL_ASSIGN_OR_RETURN(const std::vector<SurfaceKeys> keys, keys_of_objects(index, objects, resident));
   LL_ASSIGN_OR_RETURN(out.elements, index.elements(out.chunk, objects, keys));
+  LL_ASSIGN_OR_RETURN(out.near_elements, index.near_elements(out.chunk, objects, keys));
   const auto probes = index.probes_of(cell);
   out.probes.assign(probes.begin(), probes.end());
   return out;

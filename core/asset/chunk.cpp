@@ -1,9 +1,9 @@
 #include "core/asset/chunk.h"
 
+#include <absl/strings/str_cat.h>
+
 #include <algorithm>
 #include <cmath>
-#include <string>
-#include <string_view>
 
 #include "core/base/bytes.h"
 #include "core/base/check.h"
@@ -13,15 +13,14 @@
 namespace lightloom {
 namespace {
 
-constexpr uint32_t kVersion = 1;
+constexpr uint32_t kCellVersion = 2, kRelightVersion = 1, kSurfaceVersion = 1;
 constexpr uint32_t kCellMagic = 0x43434c4cu;     // "LLCC"
 constexpr uint32_t kRelightMagic = 0x52434c4cu;  // "LLCR"
 constexpr uint32_t kSurfaceMagic = 0x53434c4cu;  // "LLCS"
 /// A lightmap side. 2·w·h then fits 31 bits, so keys and bases fit 32 with room for kDead and kSky.
 
-absl::Status corrupt(std::string_view what, std::string_view why) {
-  return absl::DataLossError(std::string(what) + " chunk is corrupt: " + std::string(why) +
-                             "; bake again or fetch it again");
+absl::Status corrupt(absl::string_view what, absl::string_view why) {
+  return absl::DataLossError(absl::StrCat(what, " chunk is corrupt: ", why, "; bake again or fetch it again"));
 }
 
 /// Fixed-size records, as they lie in the file.
@@ -29,7 +28,7 @@ struct CellHeader {
   uint32_t magic, version, order, probe_count;
   uint32_t objects, receivers, clusters, cluster_probes;
   uint64_t projection_halfs, reconstruction_halfs;
-  uint32_t columns, reserved;
+  uint32_t columns, near_texels;
 };
 struct ClusterRecord {
   uint32_t first_receiver, receivers, probes, rank;
@@ -63,7 +62,7 @@ Vec3 decode_normal(uint32_t bits) {
   return normalize(from_octahedral({snorm(bits), snorm(bits >> 16)}));
 }
 
-absl::Status check_objects(std::string_view what, const std::vector<ChunkObject>& objects) {
+absl::Status check_objects(absl::string_view what, const std::vector<ChunkObject>& objects) {
   uint64_t keys = 0;
   for (const ChunkObject& o : objects) {
     if (!valid_object(o)) return corrupt(what, "an object's lightmap size is out of range");
@@ -86,7 +85,7 @@ uint32_t encode_normal(Vec3 n) {
 std::vector<uint8_t> encode_cell(const CellChunk& c) {
   CellHeader header{};
   header.magic = kCellMagic;
-  header.version = kVersion;
+  header.version = kCellVersion;
   header.order = c.order;
   header.probe_count = c.probe_count;
   header.objects = static_cast<uint32_t>(c.objects.size());
@@ -98,7 +97,8 @@ std::vector<uint8_t> encode_cell(const CellChunk& c) {
   std::vector<float> correction;
   std::vector<Half> projection, reconstruction;
   const uint64_t stride = static_cast<uint64_t>(sh_stride(static_cast<int>(c.order)));
-  LL_CHECK(c.uniform.size() == c.receivers.size());
+  LL_CHECK(c.uniform.size() == c.receivers.size() && c.near_counts.size() == c.receivers.size());
+  LL_CHECK(c.near_texels.size() == c.near_weights.size());
   for (const CellChunk::Cluster& k : c.clusters) {
     LL_CHECK(k.projection.size() == k.rank() * k.probes.size() * stride);
     LL_CHECK(k.reconstruction.size() == k.rank() * rounded_up_to_8(k.receivers));
@@ -111,6 +111,7 @@ std::vector<uint8_t> encode_cell(const CellChunk& c) {
   }
   header.cluster_probes = static_cast<uint32_t>(probes.size());
   header.columns = static_cast<uint32_t>(correction.size());
+  header.near_texels = static_cast<uint32_t>(c.near_texels.size());
   header.projection_halfs = projection.size();
   header.reconstruction_halfs = reconstruction.size();
 
@@ -124,6 +125,9 @@ std::vector<uint8_t> encode_cell(const CellChunk& c) {
   w.array(correction);
   w.array(projection);
   w.array(reconstruction);
+  w.array(c.near_counts);
+  w.array(c.near_texels);
+  w.array(c.near_weights);
   return std::move(w).take();
 }
 
@@ -131,8 +135,8 @@ absl::StatusOr<CellChunk> decode_cell(std::span<const uint8_t> bytes) {
   ByteReader r(bytes);
   const auto header = r.value<CellHeader>();
   if (header.magic != kCellMagic) return corrupt("cell", "it does not start with LLCC");
-  if (header.version != kVersion) return corrupt("cell", "version " + std::to_string(header.version) + " is unknown");
-  if (header.order > kMaxShOrder) return corrupt("cell", "its SH order is above " + std::to_string(kMaxShOrder));
+  if (header.version != kCellVersion) return corrupt("cell", absl::StrCat("version ", header.version, " is unknown"));
+  if (header.order > kMaxShOrder) return corrupt("cell", absl::StrCat("its SH order is above ", kMaxShOrder));
 
   CellChunk c;
   c.order = header.order;
@@ -145,6 +149,9 @@ absl::StatusOr<CellChunk> decode_cell(std::span<const uint8_t> bytes) {
   const auto correction = r.array<float>(header.columns);
   const auto projection = r.array<Half>(header.projection_halfs);
   const auto reconstruction = r.array<Half>(header.reconstruction_halfs);
+  c.near_counts = r.array<uint16_t>(header.receivers);
+  c.near_texels = r.array<uint32_t>(header.near_texels);
+  c.near_weights = r.array<uint16_t>(header.near_texels);
   if (!r.at_end()) return corrupt("cell", "its length does not match its counts");
 
   LL_RETURN_IF_ERROR(check_objects("cell", c.objects));
@@ -152,6 +159,13 @@ absl::StatusOr<CellChunk> decode_cell(std::span<const uint8_t> bytes) {
     if (t.slot >= c.objects.size() || t.key >= texel_keys(c.objects[t.slot])) {
       return corrupt("cell", "a receiver lies outside its object's lightmap");
     }
+  }
+  uint64_t keys = 0, near = 0;
+  for (const ChunkObject& o : c.objects) keys += texel_keys(o);
+  for (const uint16_t n : c.near_counts) near += n;
+  if (near != c.near_texels.size()) return corrupt("cell", "its near texels do not match their counts");
+  for (const uint32_t texel : c.near_texels) {
+    if (texel >= keys) return corrupt("cell", "a near texel lies outside its object's lightmap");
   }
   for (const uint32_t p : probes) {
     if (p >= c.probe_count) return corrupt("cell", "a probe index is out of range");
@@ -208,7 +222,7 @@ absl::StatusOr<CellChunk> decode_cell(std::span<const uint8_t> bytes) {
 
 std::vector<uint8_t> encode_relight(const RelightChunk& c) {
   ByteWriter w;
-  w.value(RelightHeader{kRelightMagic, kVersion, static_cast<uint32_t>(c.objects.size()),
+  w.value(RelightHeader{kRelightMagic, kRelightVersion, static_cast<uint32_t>(c.objects.size()),
                         static_cast<uint32_t>(c.rays.size()), c.position, 0});
   w.array(c.objects);
   w.array(c.rays);
@@ -219,8 +233,8 @@ absl::StatusOr<RelightChunk> decode_relight(std::span<const uint8_t> bytes) {
   ByteReader r(bytes);
   const auto header = r.value<RelightHeader>();
   if (header.magic != kRelightMagic) return corrupt("relight", "it does not start with LLCR");
-  if (header.version != kVersion)
-    return corrupt("relight", "version " + std::to_string(header.version) + " is unknown");
+  if (header.version != kRelightVersion)
+    return corrupt("relight", absl::StrCat("version ", header.version, " is unknown"));
   RelightChunk c;
   c.position = header.position;
   c.objects = r.array<ChunkObject>(header.objects);
@@ -244,7 +258,7 @@ std::vector<uint8_t> encode_surface(const SurfaceChunk& c) {
   normals.reserve(c.normals.size());
   for (const Vec3 n : c.normals) normals.push_back(encode_normal(n));
   ByteWriter w;
-  w.value(SurfaceHeader{kSurfaceMagic, kVersion, static_cast<uint32_t>(c.keys.size()), 0, c.object});
+  w.value(SurfaceHeader{kSurfaceMagic, kSurfaceVersion, static_cast<uint32_t>(c.keys.size()), 0, c.object});
   w.array(c.keys);
   w.array(c.positions);
   w.array(normals);
@@ -256,8 +270,8 @@ absl::StatusOr<SurfaceChunk> decode_surface(std::span<const uint8_t> bytes) {
   ByteReader r(bytes);
   const auto header = r.value<SurfaceHeader>();
   if (header.magic != kSurfaceMagic) return corrupt("surface", "it does not start with LLCS");
-  if (header.version != kVersion)
-    return corrupt("surface", "version " + std::to_string(header.version) + " is unknown");
+  if (header.version != kSurfaceVersion)
+    return corrupt("surface", absl::StrCat("version ", header.version, " is unknown"));
   SurfaceChunk c;
   c.object = header.object;
   c.keys = r.array<uint32_t>(header.texels);

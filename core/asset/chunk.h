@@ -37,9 +37,10 @@ struct TexelRef {
 /// For receiver r of a cluster with probe radiance λ (per colour):
 ///   c_0 = Σ_i √(4π)·λ_i0 ÷ (4π·P)                       mean radiance of the cluster's P probes; 0 if P = 0
 ///   c_k = Σ_ij projection[k][i][j]·λ_ij − correction[k]·c_0    k = 1..K
-///   E_r = π·uniform[r]/65535·c_0 + Σ_k reconstruction[k][r]·c_k
-/// so that the uniform field 1, as relight rays project it (sh_uniform), gives π·uniform[r]/65535, whatever was truncated
-/// or rounded.
+///   E_r = π·uniform[r]/65535·c_0 + Σ_k reconstruction[k][r]·c_k + Σ_i π·near_weights[i]/65535·B(near_texels[i])
+/// so that the uniform field 1, as relight rays project it (sh_uniform), gives π·(uniform[r] + Σ_i near_weights[i])/65535,
+/// whatever was truncated or rounded. i: the entries of receiver r, which follow those of the receivers before. B: radiance
+/// that leaves a texel. They are the surfaces too near to the receiver for probes to resolve (ADR 0008).
 struct CellChunk {
   struct Cluster {
     uint32_t first_receiver = 0, receivers = 0;
@@ -56,9 +57,12 @@ struct CellChunk {
   uint32_t order = 0;
   uint32_t probe_count = 0;  ///< length of the cell's probe list in the manifest
   std::vector<ChunkObject> objects;
-  std::vector<TexelRef> receivers;  ///< in cluster order
-  std::vector<uint16_t> uniform;    ///< per receiver: irradiance under the uniform field 1, unorm16 of π
-  std::vector<Cluster> clusters;    ///< cover the receivers in order, none empty
+  std::vector<TexelRef> receivers;     ///< in cluster order
+  std::vector<uint16_t> uniform;       ///< per receiver: irradiance under the uniform field 1 by probes, unorm16 of π
+  std::vector<Cluster> clusters;       ///< cover the receivers in order, none empty
+  std::vector<uint16_t> near_counts;   ///< per receiver: its near texels
+  std::vector<uint32_t> near_texels;   ///< named as RelightChunk::rays are
+  std::vector<uint16_t> near_weights;  ///< their share of the irradiance, unorm16 of π
 };
 
 /// What one probe sees along sphere_direction(i, n), i = 0..n-1.

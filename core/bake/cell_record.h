@@ -17,13 +17,13 @@ struct CellRecord {
   ChunkRef chunk;
   Aabb bounds;  ///< of its receivers
   uint64_t gather_rays = 0;
-  uint64_t unseen = 0;                 ///< gather rays whose hit no reachable probe sees
-  double error = 0;                    ///< ‖T − T̃‖_F ÷ ‖T‖_F
-  uint64_t coefficients = 0;           ///< Σ rank · receivers over the clusters
-  uint64_t bytes_projection = 0;       ///< of the chunk
-  uint64_t bytes_reconstruction = 0;   ///< of the chunk
-  Digest key;                          ///< cell_key()
-  Trace trace;                         ///< it reads geometry
+  uint64_t unseen = 0;                ///< gather rays whose hit no reachable probe sees
+  double error = 0;                   ///< ‖T − T̃‖_F ÷ ‖T‖_F
+  uint64_t coefficients = 0;          ///< Σ rank · receivers over the clusters
+  uint64_t bytes_projection = 0;      ///< of the chunk
+  uint64_t bytes_reconstruction = 0;  ///< of the chunk
+  Digest key;                         ///< cell_key()
+  Trace trace;
   float stale = 0;                     ///< see Reuse: 0 as it is baked
   std::vector<ProbeName> probes;       ///< that it reads, ascending
   std::vector<ClusterEntry> clusters;  ///< in the chunk's order

@@ -15,7 +15,7 @@ struct RelightRecord {
   ProbeName probe;
   Digest key;  ///< relight_key()
   ChunkRef chunk;
-  Trace trace;  ///< it reads geometry and receivers
+  Trace trace;
 };
 
 std::vector<uint8_t> encode_relight_records(const std::vector<RelightRecord>& records);

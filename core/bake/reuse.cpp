@@ -18,10 +18,10 @@ std::map<Digest, uint32_t> by_key(const std::vector<Record>& records) {
 
 template <class Record>
 ReuseItem look_up(const Digest& key, const std::vector<Record>& earlier, const std::map<Digest, uint32_t>& index,
-                  const Changes& changes, Reads reads) {
+                  const Changes& changes) {
   const auto found = index.find(key);
   if (found == index.end()) return {};
-  const double share = changes.share(earlier[found->second].trace, reads);
+  const double share = changes.share(earlier[found->second].trace);
   return {share > 0 ? ReuseItem::kCrossed : ReuseItem::kHolds, found->second, share};
 }
 
@@ -42,15 +42,14 @@ absl::StatusOr<Reuse> find_reuse(const Plan& plan, const Scene& scene, const Wor
   const bool done = parallel_for(out.cells.size() + out.probes.size(), parallel, [&](uint64_t i) {
     if (i < out.cells.size()) {
       ReuseItem& item = out.cells[i];
-      item = look_up(cell_key(plan, scene, plan.cells[i]), earlier.cells, cells, changes, Reads::kGeometry);
+      item = look_up(cell_key(plan, scene, plan.cells[i]), earlier.cells, cells, changes);
       if (item.why == ReuseItem::kUnknown) return;
       item.share = std::min(1.0, item.share + static_cast<double>(earlier.cells[item.earlier].stale));
       item.why = item.share > tolerance ? ReuseItem::kCrossed : ReuseItem::kHolds;
       return;
     }
     i -= out.cells.size();
-    out.probes[i] =
-        look_up(relight_key(plan, planned[i]), earlier.probes, probes, changes, Reads::kGeometryAndReceivers);
+    out.probes[i] = look_up(relight_key(plan, planned[i]), earlier.probes, probes, changes);
   });
   if (!done) return absl::CancelledError("cancelled while looking for what an edit has changed");
   return out;

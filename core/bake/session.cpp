@@ -110,7 +110,7 @@ absl::StatusOr<std::unique_ptr<BakeSession>> BakeSession::create(Scene scene, co
 absl::StatusOr<BakedCell> BakeSession::cell(size_t index, const ChunkSink& sink, const CancelFlag* cancel) const {
   if (index >= plan_.cells.size()) return not_planned("cell", index, plan_.cells.size());
   const CellTask task = make_cell_task(plan_, scene(), plan_.cells[index]);
-  LL_ASSIGN_OR_RETURN(const CellResult result, bake_cell(tracer_, cache_.get(), task, cancel));
+  LL_ASSIGN_OR_RETURN(const CellResult result, bake_cell(tracer_, plan_, search_, cache_.get(), task, cancel));
   {
     const std::lock_guard lock(mutex_);
     spent_.gather_rays += result.stats.gather_rays;

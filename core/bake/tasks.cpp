@@ -76,6 +76,50 @@ Digest key_of(const Plan& plan, const Scene& scene, const PlannedCell& cell, con
   return h.finish();
 }
 
+/// Names the near texels of each receiver, in the order of the chunk's. Objects that the chunk does not know yet follow those it
+/// knows.
+void add_near_fields(const Plan& plan, const Scene& scene, int rays, std::span<const uint32_t> order,
+                     const std::vector<std::vector<NearTexel>>& near, CellChunk* chunk) {
+  std::map<Digest, uint32_t> object_of;
+  for (const auto& of_receiver : near) {
+    for (const NearTexel& n : of_receiver) {
+      const uint32_t o = plan.receivers.all[n.receiver].object;
+      object_of.try_emplace(scene.objects[o].id, o);
+    }
+  }
+  std::map<uint32_t, uint32_t> base_of;
+  uint32_t end = 0;
+  for (const ChunkObject& known : chunk->objects) {
+    if (const auto it = object_of.find(known.id); it != object_of.end()) {
+      base_of[it->second] = end;
+      object_of.erase(it);
+    }
+    end += 2 * known.width * known.height;
+  }
+  for (const auto& [id, o] : object_of) {
+    base_of[o] = end;
+    chunk->objects.push_back(chunk_object(plan, scene, o));
+    end += 2 * chunk->objects.back().width * chunk->objects.back().height;
+  }
+
+  constexpr size_t kMost = 65535;                     // that a count can say
+  std::vector<std::pair<uint32_t, uint32_t>> texels;  // and rays: by name, as the scene's order must not show
+  for (const uint32_t r : order) {
+    texels.clear();
+    for (const NearTexel& n : near[r]) {
+      const Receiver& texel = plan.receivers.all[n.receiver];
+      texels.emplace_back(base_of.at(texel.object) + texel.key, n.rays);
+    }
+    std::sort(texels.begin(), texels.end());
+    texels.resize(std::min(texels.size(), kMost));
+    chunk->near_counts.push_back(static_cast<uint16_t>(texels.size()));
+    for (const auto& [texel, hits] : texels) {
+      chunk->near_texels.push_back(texel);
+      chunk->near_weights.push_back(static_cast<uint16_t>(std::lround(65535.0 * hits / rays)));
+    }
+  }
+}
+
 }  // namespace
 
 Digest cell_key(const Plan& plan, const Scene& scene, const PlannedCell& cell) {
@@ -144,8 +188,8 @@ CellTask make_cell_task(const Plan& plan, const Scene& scene, const PlannedCell&
   return task;
 }
 
-absl::StatusOr<CellResult> bake_cell(const RayTracer& tracer, VisibilityCache* cache, const CellTask& task,
-                                     const CancelFlag* cancel) {
+absl::StatusOr<CellResult> bake_cell(const RayTracer& tracer, const Plan& plan, const ReceiverSearch& surfaces,
+                                     VisibilityCache* cache, const CellTask& task, const CancelFlag* cancel) {
   const int J = sh_count(task.params.order);
   const bool sl17 = task.params.method == BakeMethod::kSl17;
   CellResult out;
@@ -156,13 +200,15 @@ absl::StatusOr<CellResult> bake_cell(const RayTracer& tracer, VisibilityCache* c
       Matrix::Zero(static_cast<Eigen::Index>(task.receivers.size()), static_cast<Eigen::Index>(task.probes.size()) * J);
   std::vector<Vec3> positions;
   TraceRecorder recorder(task.grid, task.probes.size());
-  Gatherer gatherer(tracer, cache, {task.probes, task.probe_ids}, {task.params.order, task.params.rays, !sl17},
-                    &recorder);
+  Gatherer gatherer(tracer, cache, &surfaces, {task.probes, task.probe_ids},
+                    {task.params.order, task.params.rays, !sl17, near_field(task.params)}, &recorder);
+  std::vector<std::vector<NearTexel>> near;
   for (size_t r = 0; r < task.receivers.size(); ++r) {
     if (cancel != nullptr && cancel->cancelled()) return absl::CancelledError("bake of a cell cancelled");
     const std::span<float> row(transport.row(static_cast<Eigen::Index>(r)).data(),
                                static_cast<size_t>(transport.cols()));
     out.stats += gatherer.add_row(task.receivers[r], row);
+    near.emplace_back(gatherer.near().begin(), gatherer.near().end());
     positions.push_back(task.receivers[r].point.position);
     out.bounds.extend(positions.back());
   }
@@ -197,6 +243,7 @@ absl::StatusOr<CellResult> bake_cell(const RayTracer& tracer, VisibilityCache* c
   for (const uint32_t r : compressed.order) out.chunk.receivers.push_back(task.texels[r]);
   out.chunk.uniform = std::move(compressed.uniform);
   out.chunk.clusters = std::move(compressed.clusters);
+  add_near_fields(plan, tracer.scene(), task.params.rays, compressed.order, near, &out.chunk);
   out.compress_seconds = compress_watch.seconds();
   return out;
 }

@@ -38,19 +38,20 @@ struct CellResult {
   GatherStats stats;
   double error = 0;
   Aabb bounds;
-  Trace trace;                                         ///< it reads geometry
+  Trace trace;
   double transport_seconds = 0, compress_seconds = 0;  ///< thread time; not part of the result's bytes
 };
 
 CellTask make_cell_task(const Plan& plan, const Scene& scene, const PlannedCell& cell);
-/// `cache` remembers what the plan's probes see, between cells; the result does not depend on what is in it. Null (as
-/// SL17 is published): a ray is traced for every hit and probe. `cancel` may be null; the only error is cancellation.
-absl::StatusOr<CellResult> bake_cell(const RayTracer& tracer, VisibilityCache* cache, const CellTask& task,
-                                     const CancelFlag* cancel);
+/// `surfaces` are the plan's receivers. `cache` remembers what the plan's probes see, between cells; the result does not depend
+/// on what is in it. Null (as SL17 is published): a ray is traced for every hit and probe. `cancel` may be null; the only error
+/// is cancellation.
+absl::StatusOr<CellResult> bake_cell(const RayTracer& tracer, const Plan& plan, const ReceiverSearch& surfaces,
+                                     VisibilityCache* cache, const CellTask& task, const CancelFlag* cancel);
 
 struct RelightResult {
   RelightChunk chunk;
-  Trace trace;  ///< it reads geometry and receivers
+  Trace trace;
 };
 /// What the probe sees along its relight rays, as texels of the plan's receivers.
 RelightResult bake_relight(const RayTracer& tracer, const Plan& plan, const ReceiverSearch& receivers, Vec3 probe);

@@ -34,14 +34,17 @@ GatherStats& GatherStats::operator+=(const GatherStats& o) {
   return *this;
 }
 
-Gatherer::Gatherer(const RayTracer& tracer, VisibilityCache* cache, GatherProbes probes, const GatherOptions& options,
-                   TraceRecorder* recorder)
+Gatherer::Gatherer(const RayTracer& tracer, VisibilityCache* cache, const ReceiverSearch* surfaces, GatherProbes probes,
+                   const GatherOptions& options, TraceRecorder* recorder)
     : tracer_(tracer),
       cache_(cache),
+      surfaces_(surfaces),
       recorder_(recorder),
       probes_(probes),
       options_(options),
-      accumulator_(options.order) {}
+      accumulator_(options.order) {
+  LL_CHECK(surfaces != nullptr || options.near_field == 0);
+}
 
 Gatherer::Sample Gatherer::shoot(const GatherRay& ray) {
   ++stats_.gather_rays;
@@ -62,10 +65,35 @@ Gatherer::Sample Gatherer::shoot(const GatherRay& ray) {
     s.kind = Sample::kSurface;
     s.position = y.position;
     s.normal = y.geometric;
-    if (cache_ != nullptr) s.patch = cache_->patch_of(hit, y, &reach);
+    if (hit.t < options_.near_field) {
+      const uint32_t texel = surfaces_->locate(hit, &reach);
+      if (texel != Receivers::kNone) {
+        s.kind = Sample::kNear;
+        near_.push_back({texel, 1});
+      }
+    }
+    if (s.kind == Sample::kSurface && cache_ != nullptr) {
+      float of_patch = 0;
+      s.patch = cache_->patch_of(hit, y, &of_patch);
+      reach = std::max(reach, of_patch);
+    }
   }
   if (recorder_ != nullptr) s.place = recorder_->hit(y.position, reach);
   return s;
+}
+
+/// Adds up the rays of each texel.
+void Gatherer::count_near() {
+  std::sort(near_.begin(), near_.end(), [](const NearTexel& a, const NearTexel& b) { return a.receiver < b.receiver; });
+  size_t kept = 0;
+  for (size_t i = 0; i < near_.size(); ++i) {
+    if (kept > 0 && near_[kept - 1].receiver == near_[i].receiver) {
+      ++near_[kept - 1].rays;
+    } else {
+      near_[kept++] = near_[i];
+    }
+  }
+  near_.resize(kept);
 }
 
 /// V_i(ω) and ψ_i(ω): whether the probe sees what the sample found, and in which direction.
@@ -110,9 +138,11 @@ GatherStats Gatherer::add_row(const GatherPoint& receiver, std::span<float> row)
   const Strata strata = strata_of(rays);
   Rng rng(receiver.seed);
   samples_.clear();
+  near_.clear();
   for (uint32_t r = 0; r < rays; ++r) {
     samples_.push_back(shoot(gather_ray(receiver, r, strata, &rng)));
   }
+  count_near();
 
   // K_ij = w_i·V_i·Y_j(ψ_i) ÷ Σ_k w_k·V_k (Eq. 4), the weights w_i(x) perhaps times resolution.
   if (sights_.size() < near) sights_.resize(near);
@@ -120,7 +150,7 @@ GatherStats Gatherer::add_row(const GatherPoint& receiver, std::span<float> row)
   sum_.assign(rays, 0);
   for (uint32_t r = 0; r < rays; ++r) {
     const Sample& s = samples_[r];
-    if (s.kind == Sample::kDead) continue;
+    if (s.kind == Sample::kDead || s.kind == Sample::kNear) continue;
     for (uint32_t n = 0; n < receiver.links; ++n) {
       Vec3 psi;
       if (!(spatial_[n] > 0) || !sees(receiver.near[n], s, &psi)) continue;

@@ -1,5 +1,5 @@
 // From geometry to the transport matrix of a bake cell: rays leave each receiver, and what they hit is read from the
-// nearby probes that see it.
+// nearby probes that see it; what is very near is read from its own texel (ADR 0008).
 //
 // Silvennoinen & Lehtinen, "Real-time Global Illumination by Precomputed Local Reconstruction from Sparse Radiance
 // Probes", TOG 36(6), 2017, Eqs. 2, 4, 7. What may differ from the paper (ADR 0002) is in the options and in which
@@ -12,6 +12,7 @@
 
 #include "core/base/sampling.h"
 #include "core/base/vec.h"
+#include "core/receivers/receiver_search.h"
 #include "core/receivers/surface_point.h"
 #include "core/scene/ray_tracer.h"
 #include "core/trace/trace_recorder.h"
@@ -25,6 +26,14 @@ struct GatherOptions {
   int rays = 256;  ///< per receiver
   /// Weigh probes also by how finely they resolve what was hit: the solid angle of a unit of its area.
   bool weigh_by_resolution = true;
+  /// Metres: what is nearer to where a ray starts is read from its own texel; 0: nothing is.
+  float near_field = 0;
+};
+
+/// A texel in a receiver's near field: so many of its gather rays hit it, and read no probe.
+struct NearTexel {
+  uint32_t receiver = 0;  ///< the texel's, index into Receivers::all
+  uint32_t rays = 0;
 };
 
 /// A receiver and the probes it may read, nearest first.
@@ -62,19 +71,21 @@ struct GatherProbes {
 /// Works on one receiver after the other, with the memory of the last one.
 class Gatherer {
  public:
-  /// `cache` may be null: then a ray is traced for every hit and probe. `recorder` may be null: then nobody asks where the
-  /// rays went. Keeps references to the arguments.
-  Gatherer(const RayTracer& tracer, VisibilityCache* cache, GatherProbes probes, const GatherOptions& options,
-           TraceRecorder* recorder = nullptr);
+  /// `cache` may be null: then a ray is traced for every hit and probe. `surfaces` may be null if there is no near field.
+  /// `recorder` may be null: then nobody asks where the rays went. Keeps references to the arguments.
+  Gatherer(const RayTracer& tracer, VisibilityCache* cache, const ReceiverSearch* surfaces, GatherProbes probes,
+           const GatherOptions& options, TraceRecorder* recorder = nullptr);
 
-  /// α_x, added to `row`: row[i·J + j] for probe i of the cell, J = sh_count(order). E = α·λ.
-  /// REQUIRES: row.size() = probes·J.
+  /// α_x, added to `row`: row[i·J + j] for probe i of the cell, J = sh_count(order). E = α·λ + Σ π·rays/options.rays·B over
+  /// near().  REQUIRES: row.size() = probes·J.
   GatherStats add_row(const GatherPoint& receiver, std::span<float> row);
+  /// The near field of the last receiver, each texel once, by its index.
+  std::span<const NearTexel> near() const { return near_; }
 
  private:
   /// What a gather ray found.
   struct Sample {
-    enum Kind : uint8_t { kSurface, kSky, kDead } kind = kDead;
+    enum Kind : uint8_t { kSurface, kSky, kNear, kDead } kind = kDead;
     VisibilityCache::Patch patch = VisibilityCache::kNoPatch;
     Vec3 position;  ///< of the hit, pushed off, for kSurface
     Vec3 normal;
@@ -89,16 +100,19 @@ class Gatherer {
   };
 
   Sample shoot(const GatherRay& ray);
+  void count_near();
   bool sees(uint32_t probe, const Sample& sample, Vec3* psi);
 
   const RayTracer& tracer_;
   VisibilityCache* cache_;
+  const ReceiverSearch* surfaces_;
   TraceRecorder* recorder_;
   GatherProbes probes_;
   GatherOptions options_;
   GatherStats stats_;
   ShAccumulator accumulator_;
   std::vector<Sample> samples_;
+  std::vector<NearTexel> near_;
   std::vector<float> spatial_;              // w_i(x), per link
   std::vector<float> sum_;                  // Σ_k w_k·V_k, per sample
   std::vector<std::vector<Sight>> sights_;  // per place in `near`

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "core/bake/tasks.h"
-#include "core/transport/gather.h"
 #include "core/tuning/receiver_sample.h"
 
 namespace lightloom {
@@ -88,6 +87,13 @@ std::span<const float> ErrorSample::radiance(Vec3 origin, Vec3 direction) const 
   return texel == Receivers::kNone ? std::span<const float>() : lights_.radiance(texel);
 }
 
+void ErrorSample::add_near_field(std::span<const NearTexel> near, uint32_t rays, std::span<double> e) const {
+  for (const NearTexel& n : near) {
+    const auto radiance = lights_.radiance(n.receiver);
+    for (size_t l = 0; l < e.size(); ++l) e[l] += static_cast<double>(kPi * radiance[l]) * n.rays / rays;
+  }
+}
+
 std::vector<float> ErrorSample::probe_radiance(Vec3 probe, uint32_t rays, int order) const {
   const size_t J = static_cast<size_t>(sh_count(order)), lights = lights_.count();
   std::vector<float> y(J), out(lights * J);
@@ -146,17 +152,20 @@ absl::StatusOr<ProbeErrors> ErrorSample::measure(const Plan& plan, const Paralle
     const uint32_t own = plan.receivers.find(r.object, r.key);
     if (own == Receivers::kNone) return;  // a back side that this plan drops
     const CellTask task = make_cell_task(wide, scene, cell_of_one(own));
-    Gatherer gatherer(tracer_, &cache, {task.probes, task.probe_ids}, {kMaxShOrder, kBatchRays, true});
+    Gatherer gatherer(tracer_, &cache, &search_, {task.probes, task.probe_ids},
+                      {kMaxShOrder, kBatchRays, true, near_field(wide.params)});
     std::vector<float> row(task.probes.size() * J);
-    std::vector<double> model(lights * kOrders * kBatches), unseen(lights), relight(lights);
+    std::vector<double> model(lights * kOrders * kBatches), near(lights), unseen(lights), relight(lights);
     for (uint32_t b = 0; b < kBatches; ++b) {
       std::fill(row.begin(), row.end(), 0.0f);
       GatherPoint point = task.receivers.front();
       point.seed = batch_seed(r.seed, b);
       const GatherStats stats = gatherer.add_row(point, row);
       const double share = static_cast<double>(stats.unseen) / kBatchRays;
+      std::fill(near.begin(), near.end(), 0.0);
+      add_near_field(gatherer.near(), kBatchRays, near);
       for (size_t l = 0; l < lights; ++l) {
-        double band = 0;
+        double band = near[l];
         for (int n = 0; n <= kMaxShOrder; ++n) {
           for (size_t p = 0; p < task.probes.size(); ++p) {
             const float* alpha = &row[p * J];

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/base/sh.h"
-#include "core/receivers/receiver_search.h"
+#include "core/transport/gather.h"
 #include "core/tuning/sample_lights.h"
 
 namespace lightloom {
@@ -30,6 +30,9 @@ class ErrorSample {
   absl::StatusOr<ProbeErrors> measure(const Plan& plan, const Parallel& how) const;
 
   const SampleLights& lights() const { return lights_; }
+  /// E under each light from near texels, whose rays are a share of `rays`; added to `e`.
+  void add_near_field(std::span<const NearTexel> near, uint32_t rays, std::span<double> e) const;
+  const ReceiverSearch& surfaces() const { return search_; }
   /// λ of a probe by `rays` relight rays: lights × sh_count(order).
   std::vector<float> probe_radiance(Vec3 probe, uint32_t rays, int order) const;
   /// E² under each light, mean over the receivers measured.

@@ -55,8 +55,9 @@ std::vector<Sight> look_around(const RayTracer& tracer, Vec3 probe, uint64_t see
   return out;
 }
 
-/// ⟨cosθ, Y_l⟩ by the rays that α_x was gathered with, so that their noise is that of the difference.
-Functional cosine(const RayTracer& tracer, const GatherPoint& point) {
+/// ⟨cosθ, Y_l⟩ by the rays that α_x was gathered with, so that their noise is that of the difference; without those into the near
+/// field, which says what it is asked.
+Functional cosine(const RayTracer& tracer, const ReceiverSearch& surfaces, float near, const GatherPoint& point) {
   Functional out{};
   std::array<float, kCount> y;
   const Scene& scene = tracer.scene();
@@ -68,6 +69,7 @@ Functional cosine(const RayTracer& tracer, const GatherPoint& point) {
     if (hit && hit.back && !scene.materials[scene.objects[hit.object].triangles[hit.triangle].material].double_sided) {
       continue;
     }
+    if (hit && hit.t < near && surfaces.locate(hit) != Receivers::kNone) continue;
     sh_evaluate(kOrder, ray.direction, y);
     for (size_t l = 0; l < kCount; ++l) out[l] += static_cast<double>(kPi / kGatherRays * y[l]);
   }
@@ -144,11 +146,13 @@ absl::StatusOr<std::vector<double>> operator_norms(const RayTracer& tracer, cons
 
   const std::vector<Vec3> positions = positions_of(plan.placement.probes);
   VisibilityCache cache(tracer, plan.layout, plan.receivers.grids, positions);
+  const ReceiverSearch surfaces(scene, plan.layout, plan.receivers);
+  const float near = near_field(plan.params);
   std::vector<double> norms(receivers.size());
   const bool done = parallel_for(receivers.size(), how, [&](uint64_t i) {
     const CellTask& task = tasks[i];
-    Gatherer gatherer(tracer, sl17 ? nullptr : &cache, {task.probes, task.probe_ids},
-                      {plan.params.order, static_cast<int>(kGatherRays), !sl17});
+    Gatherer gatherer(tracer, sl17 ? nullptr : &cache, &surfaces, {task.probes, task.probe_ids},
+                      {plan.params.order, static_cast<int>(kGatherRays), !sl17, near});
     std::array<Functional, kBatches> batches;
     std::vector<float> row(task.probes.size() * J);
     for (uint32_t b = 0; b < kBatches; ++b) {
@@ -156,7 +160,7 @@ absl::StatusOr<std::vector<double>> operator_norms(const RayTracer& tracer, cons
       point.seed = hash_combine(kSeed + b, point.seed);
       std::fill(row.begin(), row.end(), 0.0f);
       gatherer.add_row(point, row);
-      batches[b] = cosine(tracer, point);
+      batches[b] = cosine(tracer, surfaces, near, point);
       for (size_t p = 0; p < task.probes.size(); ++p) {
         const std::span<const float> alpha = std::span(row).subspan(p * J, J);
         if (std::all_of(alpha.begin(), alpha.end(), [](float a) { return a == 0; })) continue;

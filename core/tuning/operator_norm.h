@@ -23,7 +23,7 @@
 namespace lightloom {
 
 /// √(‖m‖² ÷ (2π/3)) for each of `receivers`, indices into the plan's, by the plan's probes, order and weights; without rank, fp16
-/// and the noise of rays. m is measured by four sets of rays, and the variance between them taken off; what comes out below zero
+/// and the noise of rays. The near field loses nothing. m is measured by four sets of rays, and the variance between them taken off; what comes out below zero
 /// is 0. Directions in which a receiver sees back faces that emit nothing take no part: no light comes from there. Deterministic.
 /// Error: cancellation.
 absl::StatusOr<std::vector<double>> operator_norms(const RayTracer& tracer, const Plan& plan,

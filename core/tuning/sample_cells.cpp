@@ -3,17 +3,18 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 
 #include "core/bake/tasks.h"
 #include "core/base/half.h"
 #include "core/compression/clusters.h"
-#include "core/transport/gather.h"
 
 namespace lightloom {
 namespace {
 
 constexpr size_t kShare = 16, kMost = 4;  // of the cells
 constexpr uint32_t kRelightRays = 512;    // it is only asked how E changes
+constexpr double kNearTexelBytes = 6;
 constexpr size_t J = kMaxShCount, kOrders = kMaxShOrder + 1;
 
 absl::Status cancelled() { return absl::CancelledError("cancelled while choosing parameters"); }
@@ -97,6 +98,8 @@ absl::StatusOr<SampleCells> SampleCells::create(const RayTracer& tracer, const P
     for (Matrix& m : cell.transport) {
       m = Matrix::Zero(static_cast<Eigen::Index>(n), static_cast<Eigen::Index>(task.probes.size() * J));
     }
+    for (auto& near : cell.near) near.assign(n * lights, 0);
+    for (auto& texels : cell.near_texels) texels.assign(n, 0);
     cell.judged.assign(n * kJudges * lights * kOrders, 0);
     cell.seed = task.seed;
     for (const GatherPoint& r : task.receivers) cell.positions.push_back(r.point.position);
@@ -113,19 +116,25 @@ absl::StatusOr<SampleCells> SampleCells::create(const RayTracer& tracer, const P
     const Piece& piece = pieces[i];
     const CellTask& task = tasks[piece.cell];
     Cell& cell = out.cells_[piece.cell];
-    Gatherer gatherer(tracer, &cache, {task.probes, task.probe_ids}, {kMaxShOrder, static_cast<int>(kBatchRays), true});
+    Gatherer gatherer(tracer, &cache, &sample.surfaces(), {task.probes, task.probe_ids},
+                      {kMaxShOrder, static_cast<int>(kBatchRays), true, near_field(plan.params)});
     std::vector<float> row(task.probes.size() * J);
     for (size_t r = piece.first; r < piece.end; ++r) {
       std::vector<float> sum(row.size(), 0.0f);
+      std::vector<double> near(lights), near_sum(lights);
+      std::set<uint32_t> near_texels;
       size_t stored = 0;
       for (uint32_t b = 0; b < kBatches + kJudges; ++b) {
         GatherPoint point = task.receivers[r];
         point.seed = hash_combine(point.seed, 0xce11 + b);
         std::fill(row.begin(), row.end(), 0.0f);
         gatherer.add_row(point, row);
+        std::fill(near.begin(), near.end(), 0.0);
+        sample.add_near_field(gatherer.near(), kBatchRays, near);
         if (b >= kBatches) {
           for (size_t l = 0; l < lights; ++l) {
-            double e[kOrders] = {};
+            double e[kOrders];
+            std::fill(std::begin(e), std::end(e), near[l]);
             add_by_order(row.data(), cell.lambda[l].data(), task.probes.size(), &e);
             float* judged = &cell.judged[((r * kJudges + b - kBatches) * lights + l) * kOrders];
             std::copy(e, e + kOrders, judged);
@@ -133,9 +142,14 @@ absl::StatusOr<SampleCells> SampleCells::create(const RayTracer& tracer, const P
           continue;
         }
         for (size_t k = 0; k < sum.size(); ++k) sum[k] += row[k];
+        for (size_t l = 0; l < lights; ++l) near_sum[l] += near[l];
+        for (const NearTexel& texel : gatherer.near()) near_texels.insert(texel.receiver);
         if ((b + 1) * kBatchRays == static_cast<uint32_t>(kRays[stored])) {
-          auto to = cell.transport[stored++].row(static_cast<Eigen::Index>(r));
+          auto to = cell.transport[stored].row(static_cast<Eigen::Index>(r));
           to = Eigen::Map<const Eigen::RowVectorXf>(sum.data(), to.cols()) / static_cast<float>(b + 1);
+          for (size_t l = 0; l < lights; ++l) cell.near[stored][r * lights + l] = near_sum[l] / (b + 1);
+          cell.near_texels[stored][r] = static_cast<uint32_t>(near_texels.size());
+          ++stored;
         }
       }
     }
@@ -168,6 +182,7 @@ absl::StatusOr<CompressionCost> SampleCells::compress(const CompressionChoice& c
         compress_cell(narrowed(cell.transport[of_rays], choice.order), cell.positions, options);
     s.receivers = static_cast<double>(cell.positions.size());
     s.bytes = s.receivers * sizeof(uint16_t);
+    for (const uint32_t n : cell.near_texels[of_rays]) s.bytes += kNearTexelBytes * n;
     for (const CellChunk::Cluster& cluster : compressed.clusters) {
       s.bytes += static_cast<double>(cluster.projection.size() + cluster.reconstruction.size()) * sizeof(Half);
       s.bytes +=
@@ -190,7 +205,7 @@ absl::StatusOr<CompressionCost> SampleCells::compress(const CompressionChoice& c
             square += judge * judge;
           }
           const double of_mean = (square - kJudges * mean * mean) / (kJudges - 1) / kJudges;  // its variance
-          const double error = static_cast<double>(e[r]) - mean;
+          const double error = static_cast<double>(e[r]) + cell.near[of_rays][receiver * lights_ + l] - mean;
           const double rounded = static_cast<double>(rough[r]) - static_cast<double>(e[r]);
           s.error2 += (error * error - of_mean) * weight_[l];
           s.energy2 += (mean * mean - of_mean) * weight_[l];

@@ -92,7 +92,13 @@ struct CellHeader {
   uint jobs, probes, corrections, octets, elements;  // words
   uint uniforms, coefficients;                       // quads
   uint stride8;                                      // of a probe's halfs in a row of the matrix, in eights
-  uint unused[7];
+  uint near_first, near;                             // words: per receiver of every octet and one more; NearTexel
+  uint unused[5];
+};
+/// What a receiver sees close by: weight · B of an element adds to its irradiance.
+struct NearTexel {
+  uint element;
+  float weight;
 };
 /// Quads are counted from the start of the block.
 struct Cluster {
@@ -161,6 +167,7 @@ struct RelightPush {
 };
 struct MarkCellsPush {
   uint cells, frame;
+  uint tile_words;  // of a cell's set of tiles
 };
 struct SelectCellsPush {
   uint cells, max_cells, image_groups, max_groups;

@@ -1,4 +1,4 @@
-// Cells that read a probe which is relit in this frame.
+// Cells that read a probe which is relit in this frame, or have something in their near fields that has changed.
 #version 450
 #include "layout.h"
 
@@ -7,6 +7,8 @@ layout(std430, binding = 0) readonly buffer Cells { Cell cells[]; };
 layout(std430, binding = 1) readonly buffer CellProbes { uint cell_probes[]; };
 layout(std430, binding = 2) readonly buffer Stamps { uint stamps[]; };
 layout(std430, binding = 3) buffer Dirty { uint cell_dirty[]; };
+layout(std430, binding = 4) readonly buffer NearTiles { uint near_tiles[]; };  // a set of tiles per cell
+layout(std430, binding = 5) readonly buffer Changed { uint changed[]; };
 
 void main() {
   const uint c = invocation_index();
@@ -14,5 +16,6 @@ void main() {
   const uint first = cells[c].first_probe, count = cells[c].probes;
   uint relit = 0u;
   for (uint i = 0; i < count; ++i) relit += stamps[cell_probes[first + i]] == push.frame ? 1u : 0u;
+  for (uint w = 0; w < push.tile_words; ++w) relit |= near_tiles[c * push.tile_words + w] & changed[w];
   if (relit > 0u) cell_dirty[c] = 1u;
 }

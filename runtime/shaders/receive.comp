@@ -1,5 +1,5 @@
 // Irradiance of each receiver from its cluster's coefficients (SL17 Eq. 11, core/asset/chunk.h):
-//   E_r = π·uniform[r]/65535·c_0 + Σ_k reconstruction[k][r]·c_k
+//   E_r = π·uniform[r]/65535·c_0 + Σ_k reconstruction[k][r]·c_k + Σ_i w_i·B_i over its near field
 // No |E| above π times the greatest radiance there is, so that feedback stays bounded whatever the asset says
 // (docs/runtime.md). One invocation per octet of receivers, the halfs of one uvec4 of a column.
 #version 450
@@ -7,8 +7,8 @@
 #include "layout.h"
 
 layout(push_constant) uniform Push { ReceivePush push; };
-// The pool, as four types.
-layout(std430, binding = 0) readonly buffer Clusters { Cluster clusters[]; };
+// The pool, as three types.
+layout(std430, binding = 0) readonly buffer Radiosity { vec4 radiosity[]; };
 layout(std430, binding = 1) readonly buffer Words { uint words[]; };
 layout(std430, binding = 2) readonly buffer Quads { uvec4 quads[]; };
 layout(std430, binding = 3) readonly buffer Coefficients { vec4 coefficients[]; };
@@ -17,6 +17,12 @@ layout(std430, binding = 5) readonly buffer Shared { Control control; };
 layout(std430, binding = 6) buffer Irradiance { float irradiance[]; };  // E, then its targets
 
 const float kPi = 3.14159265358979324;
+
+/// Two quads of the pool.
+Cluster cluster_of(uint at) {
+  const uvec4 a = quads[2 * at], b = quads[2 * at + 1];
+  return Cluster(a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w);
+}
 
 /// The last of the pool's cells whose first group is not behind `group`.
 uint find_cell(uint group) {
@@ -52,11 +58,12 @@ void main() {
   const uint cluster_at = active_cells[cell].base + words[word];
   const uint octet_at = word + words[word + 4], element_at = word + words[word + 5];
   const uint uniform_at = quad + words[word + 6], coefficient_at = quad + words[word + 7];
+  const uint near_first_at = word + words[word + 9], near_at = word + words[word + 10];
   const uint begin = kReceiveOctets * (group - active_cells[cell].first_group);
   const uint end = min(begin + kReceiveOctets, active_cells[cell].octets & ~kFades);
   const bool stays = push.keep != 0u || (active_cells[cell].octets & kFades) != 0u;
   for (uint o = begin + gl_LocalInvocationIndex; o < end; o += kGroup) {
-    const Cluster cluster = clusters[cluster_at + words[octet_at + 2 * o]];
+    const Cluster cluster = cluster_of(cluster_at + words[octet_at + 2 * o]);
     const uint coefficient = coefficient_at + cluster.first_coefficient;
     const vec3 c0 = coefficients[coefficient].rgb;
     const uvec4 u = quads[uniform_at + o];
@@ -77,7 +84,12 @@ void main() {
     [[unroll]] for (uint n = 0; n < kOctet; ++n) {
       const uint element = words[element_at + kOctet * o + n];
       if (element != kNoElement) {
-        const vec3 bounded = clamp(vec3(r[n / 4][n % 4], g[n / 4][n % 4], b[n / 4][n % 4]), -limit, limit);
+        vec3 e = vec3(r[n / 4][n % 4], g[n / 4][n % 4], b[n / 4][n % 4]);
+        const uint near_end = words[near_first_at + kOctet * o + n + 1];
+        for (uint i = words[near_first_at + kOctet * o + n]; i < near_end; ++i) {
+          e += uintBitsToFloat(words[near_at + 2 * i + 1]) * radiosity[words[near_at + 2 * i]].rgb;
+        }
+        const vec3 bounded = clamp(e, -limit, limit);
         for (uint c = 0; c < 3; ++c) store(3 * element + c, bounded[c], limit[c], stays);
       }
     }

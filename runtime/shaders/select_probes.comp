@@ -79,6 +79,6 @@ void main() {
     control.updated_probes = taken;
     control.waiting_probes = found - taken;
     control.probe_cursor = next_cursor;
-    control.mark_cells = spread(taken > 0u ? push.cell_groups : 0u, push.max_groups);
+    control.mark_cells = spread(taken > 0u || control.changed_tiles > 0u ? push.cell_groups : 0u, push.max_groups);
   }
 }

@@ -22,6 +22,16 @@ size_t each_receiver(const PackedCell& cell, size_t most, Body body) {
   return n;
 }
 
+/// E += Σ_i w_i·B_i of receivers first … first + count − 1; block[colour·kReceiveBlock + r].
+void add_near_fields(const PackedCell& cell, uint32_t first, uint32_t count, const float* radiosity, float* block) {
+  for (uint32_t r = 0; r < count; ++r) {
+    for (uint32_t i = cell.near_first[first + r]; i < cell.near_first[first + r + 1]; ++i) {
+      const float* const b = radiosity + size_t{3} * cell.near_elements[i];
+      for (uint32_t c = 0; c < 3; ++c) block[c * kReceiveBlock + r] += cell.near_weights[i] * b[c];
+    }
+  }
+}
+
 }  // namespace
 
 Cells::Cells(std::pmr::memory_resource* memory, const AssetIndex& index)
@@ -136,6 +146,13 @@ void Cells::lambda_changed(uint32_t probe) {
   }
 }
 
+void Cells::radiosity_changed(const Surface& surface) {
+  if (surface.changed_tile_count() == 0) return;
+  for (uint32_t c = 0; c < packed_.size(); ++c) {
+    if (active(c) && !turns_.contains(c) && intersect(packed_[c].near_tiles, surface.changed_tiles())) turns_.add(c);
+  }
+}
+
 void Cells::reset() {
   lit_.fill(0);
   fades_.fill(0);
@@ -156,6 +173,7 @@ void Cells::project(const Kernels& kernels, WorkerPool* pool, const float* lambd
 void Cells::receive(const Kernels& kernels, WorkerPool* pool, Surface* surface, bool stay, bool may_fade) {
   pool->run(chosen_count(), [&](uint32_t i) {
     alignas(64) float block[3 * kReceiveBlock];
+    const float* const radiosity = surface->radiosity_values();
     const uint32_t index = chosen_[i];
     const PackedCell& cell = packed_[index];
     const bool stays = stay || (may_fade && fades_[index] != 0);
@@ -164,8 +182,9 @@ void Cells::receive(const Kernels& kernels, WorkerPool* pool, Surface* surface, 
       for (uint32_t first = 0; first < c.receivers; first += kReceiveBlock) {
         kernels.receive(view, cell.coefficients.data() + c.coefficients, first,
                         std::min(kReceiveBlock, c.padded - first), block);
-        surface->receive(cell.elements.data() + c.first + first, std::min(kReceiveBlock, c.receivers - first), block,
-                         stays);
+        const uint32_t count = std::min(kReceiveBlock, c.receivers - first);
+        add_near_fields(cell, c.first + first, count, radiosity, block);
+        surface->receive(cell.elements.data() + c.first + first, count, block, stays);
       }
     }
     lit_[index] = 1;

@@ -33,6 +33,8 @@ class Cells {
   /// The probe was resident and now has another relight set.
   void probe_replaced(uint32_t probe);
   void lambda_changed(uint32_t probe);
+  /// Cells whose near fields lie in a tile that the last radiosity() changed wait.
+  void radiosity_changed(const Surface& surface);
   /// Every active cell waits.
   void reset();
   /// E shows some light of every cell: that of an asset before.

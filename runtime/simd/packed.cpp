@@ -21,13 +21,16 @@ ClusterView PackedCell::view(const PackedCluster& c) const {
 
 uint64_t PackedCell::bytes() const {
   return clusters.bytes() + projection.bytes() + reconstruction.bytes() + correction.bytes() + probes.bytes() +
-         elements.bytes() + uniform.bytes() + coefficients.bytes();
+         elements.bytes() + uniform.bytes() + near_first.bytes() + near_elements.bytes() + near_weights.bytes() +
+         near_tiles.bytes() + coefficients.bytes();
 }
 
 namespace {
 
-/// In the order of their surface elements, so that E is written in one sweep too.
-void pack_receivers(const SourceCell& cell, const CellChunk::Cluster& c, const PackedCluster& to, PackedCell* packed) {
+/// In the order of their surface elements, so that E is written in one sweep too. `near_first`: per receiver of the chunk and
+/// one more.
+void pack_receivers(const SourceCell& cell, const CellChunk::Cluster& c, std::span<const uint32_t> near_first,
+                    const PackedCluster& to, PackedCell* packed) {
   std::vector<uint32_t> order(c.receivers);
   for (uint32_t r = 0; r < c.receivers; ++r) order[r] = r;
   const uint32_t* const elements = cell.elements.data() + c.first_receiver;
@@ -43,11 +46,27 @@ void pack_receivers(const SourceCell& cell, const CellChunk::Cluster& c, const P
       reconstruction[(run + k) * kReceiverAlign + r % kReceiverAlign] = c.reconstruction[k * column + order[r]];
     }
   }
+
+  // Padding has none.
+  uint32_t near = packed->near_first[to.first];
+  for (uint32_t r = 0; r < to.padded; ++r) {
+    if (r < c.receivers) {
+      const uint32_t receiver = c.first_receiver + order[r];
+      for (uint32_t n = near_first[receiver]; n < near_first[receiver + 1]; ++n, ++near) {
+        const uint32_t element = cell.near_elements[n], tile = element / kTile;
+        packed->near_elements[near] = element;
+        packed->near_weights[near] = kPi / 65535 * static_cast<float>(cell.chunk.near_weights[n]);
+        packed->near_tiles[tile / 64] |= uint64_t{1} << (tile % 64);
+      }
+    }
+    packed->near_first[to.first + r + 1] = near;
+  }
 }
 
 }  // namespace
 
-PackedCell pack_cell(const SourceCell& cell, bool full_bands, std::pmr::memory_resource* memory) {
+PackedCell pack_cell(const SourceCell& cell, uint32_t surface_elements, bool full_bands,
+                     std::pmr::memory_resource* memory) {
   PackedCell packed;
   // Kernels read a row in vectors. Where one reaches behind the last band, λ must be 0; with fewer bands than λ has, the
   // row is.
@@ -78,9 +97,15 @@ PackedCell pack_cell(const SourceCell& cell, bool full_bands, std::pmr::memory_r
   packed.probes = Array<uint32_t>(memory, end.probes);
   packed.elements = Array<uint32_t>(memory, end.first);
   packed.uniform = Array<uint16_t>(memory, end.first);
+  packed.near_first = Array<uint32_t>(memory, end.first + size_t{1});
+  packed.near_elements = Array<uint32_t>(memory, cell.near_elements.size());
+  packed.near_weights = Array<float>(memory, cell.near_elements.size());
+  packed.near_tiles = Array<uint64_t>(memory, tile_words(surface_elements));
   packed.coefficients = Array<float>(memory, end.coefficients);
   packed.projection_bytes = end.projection * sizeof(Half);
 
+  std::vector<uint32_t> near_first = {0};
+  for (const uint16_t count : cell.chunk.near_counts) near_first.push_back(near_first.back() + count);
   for (size_t i = 0; i < cell.chunk.clusters.size(); ++i) {
     const CellChunk::Cluster& c = cell.chunk.clusters[i];
     const PackedCluster& to = packed.clusters[i];
@@ -91,7 +116,7 @@ PackedCell pack_cell(const SourceCell& cell, bool full_bands, std::pmr::memory_r
     packed.reconstruction_bytes += c.reconstruction.size() * sizeof(Half);
     std::copy(c.correction.begin(), c.correction.end(), packed.correction.data() + to.correction);
     for (size_t p = 0; p < c.probes.size(); ++p) packed.probes[to.probes + p] = cell.probes[c.probes[p]];
-    pack_receivers(cell, c, to, &packed);
+    pack_receivers(cell, c, near_first, to, &packed);
   }
   return packed;
 }

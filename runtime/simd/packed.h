@@ -21,9 +21,13 @@ struct PackedCell {
   Array<PackedCluster> clusters;
   Array<uint16_t> projection, reconstruction;
   Array<float> correction;
-  Array<uint32_t> probes;    ///< of the manifest
-  Array<uint32_t> elements;  ///< each cluster's padded to kReceiverAlign, ascending
-  Array<uint16_t> uniform;   ///< likewise
+  Array<uint32_t> probes;         ///< of the manifest
+  Array<uint32_t> elements;       ///< each cluster's padded to kReceiverAlign, ascending
+  Array<uint16_t> uniform;        ///< likewise
+  Array<uint32_t> near_first;     ///< likewise, and one more: of near_elements and near_weights
+  Array<uint32_t> near_elements;  ///< whose B counts, ascending for each receiver
+  Array<float> near_weights;
+  Array<uint64_t> near_tiles;  ///< bit t: one of them is in tile t
   Array<float> coefficients;
   uint32_t stride = 0;
   uint64_t projection_bytes = 0, reconstruction_bytes = 0;  ///< in the asset
@@ -47,9 +51,17 @@ inline uint32_t dead_element(uint32_t surface_elements) { return tiles_of(surfac
 inline uint32_t sky_element(uint32_t surface_elements) { return dead_element(surface_elements) + 1; }
 /// Words of a set of tiles.
 inline uint32_t tile_words(uint32_t surface_elements) { return (tiles_of(surface_elements) + 63) / 64; }
+/// Whether two sets of tiles have one in common.
+inline bool intersect(const Array<uint64_t>& a, const Array<uint64_t>& b) {
+  for (size_t i = 0; i < a.size(); ++i) {
+    if ((a[i] & b[i]) != 0) return true;
+  }
+  return false;
+}
 
 /// REQUIRES: the cell and the rays are AssetSource's. `full_bands`: the cell has as many as λ.
-PackedCell pack_cell(const SourceCell& cell, bool full_bands, std::pmr::memory_resource* memory);
+PackedCell pack_cell(const SourceCell& cell, uint32_t surface_elements, bool full_bands,
+                     std::pmr::memory_resource* memory);
 PackedProbe pack_probe(std::span<const uint32_t> rays, uint32_t surface_elements, std::pmr::memory_resource* memory);
 
 }  // namespace lightloom::simd

@@ -34,13 +34,6 @@ Array<float> sh_table(std::pmr::memory_resource* memory, int order, uint32_t ray
   return table;
 }
 
-bool intersect(const Array<uint64_t>& a, const Array<uint64_t>& b) {
-  for (size_t i = 0; i < a.size(); ++i) {
-    if ((a[i] & b[i]) != 0) return true;
-  }
-  return false;
-}
-
 }  // namespace
 
 Probes::Probes(std::pmr::memory_resource* memory, const AssetIndex& index)

@@ -114,6 +114,7 @@ SimdStats SimdRuntime::update(const SimdFrameOptions& options) {
   for (const uint32_t p : relit) {
     if (probes_.changed(p)) cells_.lambda_changed(p);
   }
+  cells_.radiosity_changed(surface_);
   cells_.choose(options.max_cells);
   s.updated_cells = cells_.chosen_count();
   s.project_bytes = cells_.projection_bytes();

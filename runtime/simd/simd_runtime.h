@@ -61,7 +61,7 @@ class SimdRuntime {
   /// REQUIRES: the cell and the rays are AssetSource's, of the same manifest; or what limit() and coarse_rays() left
   /// of them.
   simd::PackedCell pack_cell(const SourceCell& cell) const {
-    return simd::pack_cell(cell, cell.chunk.order == order_, memory_);
+    return simd::pack_cell(cell, surface_.elements(), cell.chunk.order == order_, memory_);
   }
   simd::PackedProbe pack_probe(std::span<const uint32_t> rays) const {
     return simd::pack_probe(rays, surface_.elements(), memory_);

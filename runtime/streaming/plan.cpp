@@ -22,7 +22,20 @@ constexpr double kHysteresis = 1.25;
 
 const CellModel& model_of(CellLevel level) { return kCellModels[static_cast<size_t>(level)]; }
 
-/// The bytes of runtime/cell_block.h.
+/// What the near fields of a cell take, of which the manifest says nothing: so many entries of 6 bytes may be in the chunk
+/// besides all else.
+uint64_t near_bytes(const AssetIndex::Cell& cell, std::span<const AssetIndex::Cluster> clusters, uint32_t order) {
+  const uint64_t stride = static_cast<uint64_t>(sh_stride(static_cast<int>(order)));
+  uint64_t others = 64;
+  for (const AssetIndex::Cluster& c : clusters) {
+    others += 2 * c.rank * (c.probes * stride + (c.receivers + uint64_t{7}) / 8 * 8);
+    others += 4 * c.rank + 4 * c.probes + 48 + (8 + 2 + 2) * uint64_t{c.receivers};
+  }
+  const uint64_t entries = (cell.chunk.size - std::min(cell.chunk.size, others)) / 6;
+  return 8 * entries + 4 * uint64_t{cell.receivers};
+}
+
+/// The bytes of runtime/cell_block.h but for near_bytes.
 uint64_t cell_bytes(std::span<const AssetIndex::Cluster> clusters, uint32_t order, const CellModel& model) {
   const uint64_t stride = static_cast<uint64_t>(sh_stride(static_cast<int>(std::min(order, model.bands - 1))));
   uint64_t bytes = 320;
@@ -63,7 +76,8 @@ StreamCosts::StreamCosts(const AssetIndex& index) {
     auto& costs = cells_.emplace_back();
     for (const CellLevel level : {CellLevel::kBase, CellLevel::kSome, CellLevel::kAll}) {
       uint64_t& cost = costs[static_cast<size_t>(level)];
-      cost = cell_bytes(index.clusters_of(c), index.order(), model_of(level));
+      cost = cell_bytes(index.clusters_of(c), index.order(), model_of(level)) +
+             near_bytes(index.cells()[c], index.clusters_of(c), index.order());
       if (level != CellLevel::kBase) cost += costs[static_cast<size_t>(CellLevel::kBase)];
     }
   }

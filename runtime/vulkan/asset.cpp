@@ -239,6 +239,8 @@ absl::StatusOr<VulkanAsset::LitCell> VulkanAsset::place_cell(const CellBlock& bl
 absl::Status VulkanAsset::load_cell(uint32_t cell, const SourceCell& source, const Detail& detail) {
   LL_ASSIGN_OR_RETURN(CellBlock block, make_cell_block(source, context_->page_bytes, memory_));
   std::pmr::vector<uint32_t> elements(source.elements.begin(), source.elements.end(), memory_);
+  std::vector<uint32_t> tiles(tile_words_);
+  for (const uint32_t e : source.near_elements) tiles[(e >> tile_shift_) / 32] |= 1u << (e >> tile_shift_) % 32;
 
   const AssetIndex::Target target{AssetIndex::Kind::kCell, cell};
   const std::lock_guard lock(mutex_);
@@ -272,6 +274,9 @@ absl::Status VulkanAsset::load_cell(uint32_t cell, const SourceCell& source, con
   c.next = *lit;
   c.next->detail = detail;
   c.elements = std::move(elements);
+  const size_t first_tile = size_t{cell} * tile_words_;  // the same in every detail
+  std::copy(tiles.begin(), tiles.end(), near_table_.as<uint32_t>() + first_tile);
+  near_table_.touch(4 * first_tile, 4 * (first_tile + tile_words_));
   ++lit_;
   touch();
   return absl::OkStatus();
@@ -399,7 +404,9 @@ void VulkanAsset::reset_feedback() {
 }
 
 bool VulkanAsset::tables_pending() const {
-  return cell_table_.pending_bytes() + slot_table_.pending_bytes() + map_table_.pending_bytes() > 0 ||
+  return cell_table_.pending_bytes() + near_table_.pending_bytes() + slot_table_.pending_bytes() +
+                 map_table_.pending_bytes() >
+             0 ||
          std::any_of(inputs_.begin(), inputs_.end(), [](const auto& t) { return t.pending_bytes() > 0; });
 }
 

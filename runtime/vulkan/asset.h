@@ -154,6 +154,7 @@ class VulkanAsset {
   mutable std::mutex mutex_;  ///< guards all below
   std::array<ShadowTable, 3> inputs_;
   ShadowTable cell_table_, slot_table_, map_table_;
+  ShadowTable near_table_;                          ///< per cell: the tiles of its near fields, a bit each
   Buffer inherited_;                                ///< E of the asset before this
   std::pmr::vector<VkBufferCopy> inherited_parts_;  ///< of it that the first frame copies
   uint32_t inherited_until_ = 0;                    ///< the frame that frees it; 0: not copied yet

@@ -26,6 +26,7 @@ VulkanAsset::VulkanAsset(Context* context, const Pipelines* pipelines, std::shar
       cell_table_(memory),
       slot_table_(memory),
       map_table_(memory),
+      near_table_(memory),
       inherited_parts_(memory),
       coarse_rays_(memory),
       surfaces_(index_.objects().size(), false, memory),
@@ -56,7 +57,8 @@ void VulkanAsset::free_all_but_light() {
         &active_slots_, &cell_probes_, &cell_dirty_, &cell_seen_, &active_cells_, &control_, &inherited_}) {
     *b = Buffer();
   }
-  for (ShadowTable* t : {&inputs_[0], &inputs_[1], &inputs_[2], &cell_table_, &slot_table_, &map_table_}) {
+  for (ShadowTable* t :
+       {&inputs_[0], &inputs_[1], &inputs_[2], &cell_table_, &slot_table_, &map_table_, &near_table_}) {
     t->free_device();
   }
   image_ = DeviceImage();
@@ -95,6 +97,7 @@ absl::Status VulkanAsset::create_arrays() {
 
   for (ShadowTable& input : inputs_) LL_RETURN_IF_ERROR(input.create(context_, 12 * S, 4));
   LL_RETURN_IF_ERROR(cell_table_.create(context_, C * sizeof(gpu::Cell), sizeof(gpu::Cell)));
+  LL_RETURN_IF_ERROR(near_table_.create(context_, C * 4 * tile_words_, 4 * tile_words_));
   LL_RETURN_IF_ERROR(slot_table_.create(context_, slots * sizeof(gpu::Slot), sizeof(gpu::Slot), 0xff));
   const auto buffer = [this](Buffer* to, uint64_t bytes, BufferUse use = BufferUse::kDevice) -> absl::Status {
     LL_ASSIGN_OR_RETURN(*to, Buffer::create(context_, bytes, use));
@@ -173,7 +176,9 @@ absl::Status VulkanAsset::create_sets() {
                                                   control_.whole(), slot_seen_.whole()};
   LL_ASSIGN_OR_RETURN(select_probes_, sets_->make(Pass::kSelectProbes, select_probes));
   const VkDescriptorBufferInfo cells = cell_table_.device().whole();
-  const VkDescriptorBufferInfo mark_cells[] = {cells, cell_probes_.whole(), stamps_.whole(), cell_dirty_.whole()};
+  const VkDescriptorBufferInfo mark_cells[] = {
+      cells,           cell_probes_.whole(), stamps_.whole(), cell_dirty_.whole(), near_table_.device().whole(),
+      changed_.whole()};
   LL_ASSIGN_OR_RETURN(mark_cells_, sets_->make(Pass::kMarkCells, mark_cells));
   const VkDescriptorBufferInfo select_cells[] = {cells,
                                                  cell_probes_.whole(),

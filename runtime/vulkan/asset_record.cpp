@@ -148,6 +148,7 @@ void VulkanAsset::record_clears(VkCommandBuffer commands) {
   cell_table_.clear(commands, *context_);
   slot_table_.clear(commands, *context_);
   map_table_.clear(commands, *context_);
+  near_table_.clear(commands, *context_);
   for (const Buffer* b : {&irradiance_, &radiosity_, &points_, &normals_, &lambda_, &dirty_, &slot_seen_, &stamps_,
                           &cell_dirty_, &cell_seen_, &control_}) {
     if (b->exists()) vk.CmdFillBuffer(commands, b->handle(), 0, VK_WHOLE_SIZE, 0);
@@ -197,7 +198,9 @@ absl::Status VulkanAsset::record_uploads(VkCommandBuffer commands, uint32_t fram
   uploads_.record(commands, *context_, &staging, chunks, [this](AssetIndex::Target t) { uploaded(t); });
   chunk_bytes_ = staging.used() - before;
   slot_table_.record(commands, &staging, staging.room());
-  cell_table_.record(commands, &staging, staging.room());
+  // A cell is live once it is known what else its light depends on.
+  near_table_.record(commands, &staging, staging.room());
+  if (near_table_.pending_bytes() == 0) cell_table_.record(commands, &staging, staging.room());
   map_table_.record(commands, &staging, staging.room());
   if (!smooth_ && options_.smoothing && (settings_.options.smoothing < 1 || fade_left_ > 0)) {
     barrier_between(*context_, commands);
@@ -309,7 +312,7 @@ void VulkanAsset::record_select_and_relight(VkCommandBuffer commands, uint32_t f
     dispatch_indirect(commands, offsetof(gpu::Control, relight) + p * sizeof(gpu::Groups));
   }
   memory->time(commands, frame, Step::kRelight);
-  const gpu::MarkCellsPush mark{static_cast<uint32_t>(cells_.size()), frame};
+  const gpu::MarkCellsPush mark{static_cast<uint32_t>(cells_.size()), frame, tile_words_};
   pipelines_->bind(commands, Pass::kMarkCells, mark_cells_, mark);
   dispatch_indirect(commands, offsetof(gpu::Control, mark_cells));
   barrier_between(*context_, commands);

@@ -60,7 +60,7 @@ constexpr std::array<PassInfo, kPasses> kPassInfo = {
     PassInfo{kMarkSpirv, {4, false, false}, sizeof(gpu::MarkPush)},
     PassInfo{kSelectProbesSpirv, {6, false, false}, sizeof(gpu::SelectProbesPush)},
     PassInfo{kRelightSpirv, {7, false, false}, sizeof(gpu::RelightPush)},
-    PassInfo{kMarkCellsSpirv, {4, false, false}, sizeof(gpu::MarkCellsPush)},
+    PassInfo{kMarkCellsSpirv, {6, false, false}, sizeof(gpu::MarkCellsPush)},
     PassInfo{kSelectCellsSpirv, {7, false, false}, sizeof(gpu::SelectCellsPush)},
     PassInfo{kProjectSpirv, {7, false, false}, sizeof(gpu::ProjectPush)},
     PassInfo{kReceiveSpirv, {7, false, false}, sizeof(gpu::ReceivePush)},

@@ -61,13 +61,9 @@ absl::Status CellPools::create(Pool* pool, uint64_t least) {
   const VkDescriptorBufferInfo project[] = {
       data, data, data, data, bindings_.lambda->whole(), bindings_.active_cells->whole(), bindings_.control->whole()};
   sets_->write(pool->project, Pass::kProject, project);
-  const VkDescriptorBufferInfo receive[] = {data,
-                                            data,
-                                            data,
-                                            data,
-                                            bindings_.active_cells->whole(),
-                                            bindings_.control->whole(),
-                                            bindings_.irradiance->whole()};
+  const VkDescriptorBufferInfo receive[] = {
+      bindings_.radiosity->whole(), data, data, data, bindings_.active_cells->whole(), bindings_.control->whole(),
+      bindings_.irradiance->whole()};
   sets_->write(pool->receive, Pass::kReceive, receive);
   return absl::OkStatus();
 }

@@ -14,11 +14,11 @@ struct GatheredCell {
   uint64_t trace_bytes = 0;
 };
 
-/// `cache`, `options`: as Gatherer. The rows are thrown away.
-inline GatheredCell gather_cell(const RayTracer& tracer, VisibilityCache* cache, const CellTask& task,
-                                const GatherOptions& options) {
+/// `cache`, `surfaces`, `options`: as Gatherer. The rows are thrown away.
+inline GatheredCell gather_cell(const RayTracer& tracer, VisibilityCache* cache, const ReceiverSearch& surfaces,
+                                const CellTask& task, const GatherOptions& options) {
   TraceRecorder recorder(task.grid, task.probes.size());
-  Gatherer gatherer(tracer, cache, {task.probes, task.probe_ids}, options, &recorder);
+  Gatherer gatherer(tracer, cache, &surfaces, {task.probes, task.probe_ids}, options, &recorder);
   std::vector<float> row(task.probes.size() * static_cast<size_t>(sh_count(options.order)));
   GatheredCell out;
   for (const GatherPoint& receiver : task.receivers) {

@@ -52,6 +52,7 @@ int run(int argc, char** argv) {
   const double before = bare_seconds();
   std::vector<Vec3> probes;
   for (const Probe& p : plan.placement.probes) probes.push_back(p.position);
+  const ReceiverSearch surfaces(scene, plan.layout, plan.receivers);
   VisibilityCache cache(*tracer, plan.layout, plan.receivers.grids, probes);
   std::vector<GatherStats> stats(tasks.size());
   std::atomic<uint64_t> trace_bytes{0};
@@ -59,7 +60,8 @@ int run(int argc, char** argv) {
   parallel_for(plan.cells.size(), {}, [&](uint64_t i) {
     const CellTask task = make_cell_task(plan, scene, plan.cells[i]);
     const bench::GatheredCell cell =
-        bench::gather_cell(*tracer, cached ? &cache : nullptr, task, {params.order, plan.params.rays, !sl17});
+        bench::gather_cell(*tracer, cached ? &cache : nullptr, surfaces, task,
+                           {params.order, plan.params.rays, !sl17, near_field(plan.params)});
     stats[i] = cell.stats;
     trace_bytes += cell.trace_bytes;
   });

@@ -16,7 +16,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   if (!again.ok() || encode_bake_traces(*again) != bytes) std::abort();
   const Changes changes(traces->world, WorldContents{traces->world.grid, {}, {}});
   for (const CellRecord& cell : traces->cells) {
-    const double share = changes.share(cell.trace, Reads::kGeometry);
+    const double share = changes.share(cell.trace);
     if (!(share >= 0 && share <= 1)) std::abort();
   }
   return 0;

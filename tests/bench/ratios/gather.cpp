@@ -15,9 +15,6 @@ namespace {
 /// A planned level.
 struct Level {
   Level() {
-    BakeParams params;
-    params.texels_per_metre = 4;
-    plan = or_exit(make_plan(*tracer, params, {}));
     for (const PlannedCell& cell : plan.cells) cells.push_back(make_cell_task(plan, scene, cell));
     for (const Probe& p : plan.placement.probes) probes.push_back(p.position);
   }
@@ -25,7 +22,12 @@ struct Level {
   Scene scene = *builtin_scene("flat");
   std::unique_ptr<RayTracer> tracer = or_exit(RayTracer::create(scene));
   BareEmbree bare{scene};
-  Plan plan;
+  Plan plan = [this] {
+    BakeParams params;
+    params.texels_per_metre = 4;
+    return or_exit(make_plan(*tracer, params, {}));
+  }();
+  ReceiverSearch surfaces{scene, plan.layout, plan.receivers};
   std::vector<CellTask> cells;
   std::vector<Vec3> probes;
 };
@@ -45,7 +47,8 @@ void gather(benchmark::State& state) {
             }
           },
           [&] {
-            gather_cell(*level.tracer, &cache, cell, {params.order, params.rays});
+            gather_cell(*level.tracer, &cache, level.surfaces, cell,
+                        {params.order, params.rays, true, near_field(params)});
           });
     }
   }

@@ -65,6 +65,54 @@ TEST_F(Amortised, NoChangeNoWork) {
   EXPECT_EQ(runtime_.stats().skipped, 1u);
 }
 
+/// A cell that has an element in a near field, but no probe that sees it.
+class NearField : public ::testing::TestWithParam<uint32_t> {};
+
+TEST_P(NearField, AChangeThatNoProbeSeesIsReceived) {
+  SyntheticAsset asset = testing::empty_asset(0, 4);
+  std::vector<uint32_t> keys(200);
+  for (uint32_t k = 0; k < keys.size(); ++k) keys[k] = k;
+  const ChunkObject object = asset.add_object(20, 20, keys);
+  RelightChunk probe;
+  probe.objects = {object};
+  probe.rays.assign(4, 0);
+  asset.add_probe(probe);
+  for (uint32_t c = 0; c < 2; ++c) {
+    CellChunk cell;
+    cell.probe_count = 1;
+    cell.objects = {object};
+    cell.receivers = {{0, c}};
+    cell.uniform = {30000};
+    cell.near_counts = {static_cast<uint16_t>(c)};
+    if (c == 1) cell.near_texels = {150}, cell.near_weights = {13107};
+    CellChunk::Cluster cluster;
+    cluster.receivers = 1;
+    cluster.probes = {0};
+    cluster.bounds.extend({0, 0, 0});
+    cell.clusters = {cluster};
+    asset.add_cell(cell, {0});
+  }
+  TestRuntime runtime(GetParam());
+  ASSERT_EQ(runtime.load(asset), LIGHTLOOM_OK) << joined(runtime.received().errors);
+  SurfaceLight light = testing::random_light(200, 3);
+  light.albedo.assign(200, {});
+  runtime.light(light);
+  ASSERT_EQ(lightloom_update(runtime.get(), 3), LIGHTLOOM_OK);
+  const std::vector<Vec3> before = runtime.irradiance();
+  light.emission[150] += Vec3{5, 0, 10};
+  runtime.light(light);
+  ASSERT_EQ(lightloom_update(runtime.get(), 1), LIGHTLOOM_OK);
+  EXPECT_EQ(runtime.stats().updated_probes, 0u);
+  EXPECT_EQ(runtime.stats().updated_cells, 1u);
+  const std::vector<Vec3> after = runtime.irradiance();
+  EXPECT_EQ(after[0], before[0]);
+  EXPECT_NEAR(after[1].x - before[1].x, 3.14159265f, 1e-4);
+  EXPECT_NEAR(after[1].z - before[1].z, 2 * 3.14159265f, 1e-4);
+}
+
+INSTANTIATE_TEST_SUITE_P(Devices, NearField, ::testing::Values(0u, uint32_t{LIGHTLOOM_CREATE_CPU}),
+                         [](const auto& param) { return param.param == 0 ? "Vulkan" : "Simd"; });
+
 TEST_F(Amortised, OnlyProbesThatSeeTheChangeAreRelit) {
   for (Vec3& a : light_.albedo) a = {};  // no second bounce
   start();

@@ -22,6 +22,9 @@ class AssetSourceTest : public ::testing::Test {
     cell_.objects = {second_, first_};
     cell_.receivers = {{1, 6}, {0, 2}};
     cell_.uniform = {1, 2};
+    cell_.near_counts = {0, 1};
+    cell_.near_texels = {5};
+    cell_.near_weights = {9};
     CellChunk::Cluster cluster;
     cluster.receivers = 2;
     cluster.probes = {0};
@@ -53,7 +56,13 @@ TEST_F(AssetSourceTest, NumbersElementsByManifestOrderAndKey) {
   ASSERT_TRUE(source.ok()) << source.status();
   EXPECT_EQ(source->surface_elements(), 5u);  // first: keys 1, 6; second: keys 0, 2, 5
   EXPECT_THAT(source->cell(0)->elements, ElementsAre(1, 3));
+  EXPECT_THAT(source->cell(0)->near_elements, ElementsAre(4));
   EXPECT_THAT(*source->relight(0), ElementsAre(4, RelightChunk::kSky, 0));
+}
+
+TEST_F(AssetSourceTest, NearTexelOutsideTheSurface) {
+  cell_.near_texels[0] = 1;
+  expect_bad_cell("a near texel is no texel of its object's surface");
 }
 
 TEST_F(AssetSourceTest, ReceiverOutsideTheSurface) {

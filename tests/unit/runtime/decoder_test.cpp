@@ -37,6 +37,7 @@ struct Tiny {
     cell.objects = {object};
     cell.receivers = {{0, 4}, {0, 0}};
     cell.uniform = {65535, 13107};  // 1 and 1/5
+    cell.near_counts = {0, 0};
     CellChunk::Cluster cluster;
     cluster.receivers = 2;
     cluster.probes = {1, 0};  // of the cell's list: manifest probes 0 and 1
@@ -110,6 +111,21 @@ TEST(Decoder, OneCellByHand) {
   expect_near(frame.irradiance[0], kPiD / 5 - c1[0] / 2, 0.3 * kPiD - c1[1] / 2, 0.4 * kPiD - c1[2] / 2);
   // Element 1 has no receiver.
   expect_near(frame.irradiance[1], 0, 0, 0);
+}
+
+TEST(Decoder, NearFieldByHand) {
+  Tiny tiny(0);
+  tiny.cell.near_counts = {1, 2};
+  tiny.cell.near_texels = {0, 2, 4};  // elements 0, 1, 2
+  tiny.cell.near_weights = {13107, 6553, 26214};
+  SurfaceLight light = dark(3);
+  light.emission = {{1, 0, 0}, {0, 2, 0}, {0, 0, 5}};
+  const DecodedFrame without = Tiny(0).decode(light, std::vector<Vec3>(3));
+  const DecodedFrame frame = tiny.decode(light, std::vector<Vec3>(3));
+  // Receiver 0 is element 2, receiver 1 is element 0.
+  const Vec3 first = frame.irradiance[2] - without.irradiance[2], second = frame.irradiance[0] - without.irradiance[0];
+  expect_near(first, kPiD / 5, 0, 0);
+  expect_near(second, 0, 2 * kPiD * 6553 / 65535, 5 * kPiD * 0.4);
 }
 
 TEST(Decoder, FirstBandByHand) {

@@ -35,6 +35,13 @@ std::vector<ChunkObject> chunk_objects(const SyntheticAsset& asset) {
   return objects;
 }
 
+/// Where each of the objects' texels begin in the numbering of rays and near texels.
+std::vector<uint32_t> bases_of(const std::vector<ChunkObject>& objects) {
+  std::vector<uint32_t> base(objects.size());
+  for (size_t i = 1; i < base.size(); ++i) base[i] = base[i - 1] + 2 * objects[i - 1].width * objects[i - 1].height;
+  return base;
+}
+
 RelightChunk random_relight(const SyntheticAsset& asset, const std::vector<Texel>& texels,
                             const RandomAssetOptions& options, Rng* rng) {
   RelightChunk chunk;
@@ -42,10 +49,7 @@ RelightChunk random_relight(const SyntheticAsset& asset, const std::vector<Texel
   chunk.objects = chunk_objects(asset);
   // The chunk's order of objects is its own.
   std::reverse(chunk.objects.begin(), chunk.objects.end());
-  std::vector<uint32_t> base(chunk.objects.size());
-  for (size_t i = 1; i < base.size(); ++i) {
-    base[i] = base[i - 1] + 2 * chunk.objects[i - 1].width * chunk.objects[i - 1].height;
-  }
+  const std::vector<uint32_t> base = bases_of(chunk.objects);
   for (int r = 0; r < options.relight_rays; ++r) {
     const uint32_t kind = rng->next_below(10);
     if (!options.closed && kind == 0) {
@@ -199,12 +203,22 @@ SyntheticAsset random_asset(const RandomAssetOptions& options) {
     CellChunk cell;
     cell.order = static_cast<uint32_t>(options.order);
     cell.objects = chunk_objects(asset);
+    const std::vector<uint32_t> base = bases_of(cell.objects);
     std::vector<uint32_t> probes;
     for (uint32_t p = rng.next_below(3); p < options.probes; p += 1 + rng.next_below(3)) probes.push_back(p);
     cell.probe_count = static_cast<uint32_t>(probes.size());
     for (; next < end; ++next) {
       cell.receivers.push_back({texels[next].object, texels[next].key});
-      cell.uniform.push_back(options.closed ? 65535 : static_cast<uint16_t>(40000 + rng.next_below(25536)));
+      uint16_t near = 0;  // a tenth of the light
+      cell.near_counts.push_back(static_cast<uint16_t>(rng.next_below(4)));
+      for (int n = 0; n < cell.near_counts.back(); ++n) {
+        const Texel t = texels[rng.next_below(static_cast<uint32_t>(texels.size()))];
+        cell.near_texels.push_back(base[t.object] + t.key);
+        cell.near_weights.push_back(static_cast<uint16_t>(rng.next_below(4000)));
+        near = static_cast<uint16_t>(near + cell.near_weights.back());
+      }
+      cell.uniform.push_back(
+          static_cast<uint16_t>(options.closed ? 65535 - near : 40000 + rng.next_below(25536 - 12000)));
     }
     const uint32_t receivers = static_cast<uint32_t>(cell.receivers.size());
     const uint32_t clusters = std::min(receivers, count(&rng, 1, options.max_clusters));

@@ -24,7 +24,7 @@ using Bytes = std::vector<uint8_t>;
 
 // Where the sample cell's arrays start, and fields of the records.
 constexpr size_t kObjects = 64, kReceivers = 144, kUniform = 192, kClusters = 208, kProbes = 304, kCorrection = 320,
-                 kProjection = 336, kReconstruction = 416;
+                 kProjection = 336, kReconstruction = 416, kNearCounts = 464, kNearTexels = 480, kNearWeights = 496;
 constexpr size_t kObjectWidth = 32, kObjectHeight = 36;
 constexpr size_t kClusterSize = 48;
 
@@ -56,13 +56,16 @@ TEST(HostileCell, OffsetsAreWhereTheDocumentSays) {
   EXPECT_EQ(peek<float>(b, kCorrection + 8), 2.0f);
   EXPECT_EQ(peek<Half>(b, kProjection + 2), float_to_half(2));
   EXPECT_EQ(peek<Half>(b, kReconstruction), float_to_half(0.5f));
+  EXPECT_EQ(peek<uint16_t>(b, kNearCounts + 6), 1u);
+  EXPECT_EQ(peek<uint32_t>(b, kNearTexels + 8), 33u);
+  EXPECT_EQ(peek<uint16_t>(b, kNearWeights + 4), 256u);
 }
 
 TEST(HostileCell, MagicVersionAndOrder) {
   const Bytes good = encode_cell(sample_cell());
   expect_cell_rejected(encode_relight(sample_relight()), "does not start with LLCC");
   expect_cell_rejected({}, "does not start with LLCC");
-  expect_cell_rejected(poke<uint32_t>(good, 4, 2), "version 2 is unknown");
+  expect_cell_rejected(poke<uint32_t>(good, 4, 1), "version 1 is unknown");
   expect_cell_rejected(poke<uint32_t>(good, 4, 0), "version 0 is unknown");
   expect_cell_rejected(poke<uint32_t>(good, 8, 10), "SH order");
   expect_cell_rejected(poke<uint32_t>(good, 8, 0xffffffff), "SH order");
@@ -71,7 +74,7 @@ TEST(HostileCell, MagicVersionAndOrder) {
 
 TEST(HostileCell, EveryCountIsChecked) {
   const Bytes good = encode_cell(sample_cell());
-  for (const size_t at : {16u, 20u, 24u, 28u, 48u}) {  // objects, receivers, clusters, cluster probes, columns
+  for (const size_t at : {16u, 20u, 24u, 28u, 48u, 52u}) {  // objects, receivers, clusters, their probes, columns, near
     const uint32_t count = peek<uint32_t>(good, at);
     for (const uint32_t wrong : {0u, count - 1, count + 1, count + 1000, 0x40000000u, 0x7fffffffu, 0xffffffffu}) {
       EXPECT_FALSE(decode_cell(poke(good, at, wrong)).ok()) << at << " " << wrong;
@@ -95,6 +98,10 @@ TEST(HostileCell, Indices) {
                        "outside its object's lightmap");  // key of a 3×3
   expect_cell_rejected(poke<uint32_t>(good, kReceivers + 4, ~0u), "outside its object's lightmap");
   expect_cell_rejected(poke<uint32_t>(good, kProbes, 3), "probe index");
+  expect_cell_rejected(poke<uint32_t>(good, kNearTexels, 34), "near texel");
+  expect_cell_rejected(poke<uint32_t>(good, kNearTexels, RelightChunk::kSky), "near texel");
+  expect_cell_rejected(poke<uint16_t>(good, kNearCounts, 1), "near texels");
+  expect_cell_rejected(poke<uint16_t>(good, kNearCounts, 65535), "near texels");
   expect_cell_rejected(poke<uint32_t>(good, 12, 2), "probe index");  // the cell has fewer probes
 }
 

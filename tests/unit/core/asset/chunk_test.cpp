@@ -20,6 +20,9 @@ void expect_equal(const CellChunk& a, const CellChunk& b) {
   EXPECT_EQ(a.objects, b.objects);
   EXPECT_EQ(a.receivers, b.receivers);
   EXPECT_EQ(a.uniform, b.uniform);
+  EXPECT_EQ(a.near_counts, b.near_counts);
+  EXPECT_EQ(a.near_texels, b.near_texels);
+  EXPECT_EQ(a.near_weights, b.near_weights);
   ASSERT_EQ(a.clusters.size(), b.clusters.size());
   for (size_t i = 0; i < a.clusters.size(); ++i) {
     const CellChunk::Cluster &c = a.clusters[i], &d = b.clusters[i];
@@ -63,6 +66,7 @@ TEST(CellChunk, SingleReceiverAndRank0RoundTrip) {
   c.objects = {{lightloom::testing::digest_of(1), 1, 1}};
   c.receivers = {{0, 1}};
   c.uniform = {12345};
+  c.near_counts = {0};
   c.clusters.resize(1);
   c.clusters[0].receivers = 1;
   c.clusters[0].bounds.extend({1, 2, 3});
@@ -74,8 +78,8 @@ TEST(CellChunk, SingleReceiverAndRank0RoundTrip) {
 
 TEST(CellChunk, ArraysStartAtMultiplesOf16) {
   const auto bytes = encode_cell(sample_cell());
-  // 2 objects, 5 receivers, 2 clusters, 3 cluster probes, 3 columns, 40 and 24 halfs.
-  EXPECT_EQ(bytes.size(), 64u + 80 + 48 + 16 + 96 + 16 + 16 + 80 + 48);
+  // 2 objects, 5 receivers, 2 clusters, 3 cluster probes, 3 columns, 40 and 24 halfs; 5 counts of 3 near texels.
+  EXPECT_EQ(bytes.size(), 64u + 80 + 48 + 16 + 96 + 16 + 16 + 80 + 48 + 16 + 16 + 6);
 }
 
 TEST(RelightChunk, RoundTrip) {

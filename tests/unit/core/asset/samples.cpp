@@ -50,6 +50,9 @@ CellChunk sample_cell() {
   b.bounds = {{5, 5, 5}, {5, 5, 5}};
   b.error = 0;
   c.clusters = {a, b};
+  c.near_counts = {2, 0, 0, 1, 0};
+  c.near_texels = {15, 16, 33};  // keys 0..15 are the first object's, 16..33 the second's
+  c.near_weights = {1000, 65535, 256};
   return c;
 }
 

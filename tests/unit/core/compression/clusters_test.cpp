@@ -193,6 +193,7 @@ TEST(CompressCell, SameInputSameBytes) {
     chunk.objects = {{Digest{}, 300, 1}};
     for (const uint32_t r : cell.order) chunk.receivers.push_back({0, r});
     chunk.uniform = cell.uniform;
+    chunk.near_counts.resize(cell.uniform.size());
     chunk.clusters = cell.clusters;
     return encode_cell(chunk);
   };

@@ -37,22 +37,20 @@ TEST(Changes, NothingIsChangedByNothing) {
   const SmallWorld world(test::room_with_crate());
   const Changes changes(world.contents, world.contents);
   EXPECT_EQ(changes.cells(), 0u);
-  EXPECT_EQ(changes.share(ray(world.contents.grid, {0.2f, 0.2f, 0.2f}, {3.8f, 2.8f, 3.8f}), Reads::kGeometry), 0);
+  EXPECT_EQ(changes.share(ray(world.contents.grid, {0.2f, 0.2f, 0.2f}, {3.8f, 2.8f, 3.8f})), 0);
 }
 
 TEST(Changes, RaysAreReachedByWhatTheyPassOnly) {
   const SmallWorld before(with_crate_at(0)), after(with_crate_at(0.3f));
   const Changes changes(before.contents, after.contents);
   EXPECT_GT(changes.cells(), 10u);
-  const auto share = [&](Vec3 from, Vec3 to) {
-    return changes.share(ray(before.contents.grid, from, to), Reads::kGeometry);
-  };
+  const auto share = [&](Vec3 from, Vec3 to) { return changes.share(ray(before.contents.grid, from, to)); };
   EXPECT_EQ(share({0.2f, 0.5f, 1.7f}, {3.9f, 0.5f, 1.7f}), 1);  // through it
   EXPECT_EQ(share({0.2f, 2.5f, 0.2f}, {3.9f, 2.5f, 3.9f}), 0);  // high above it
   EXPECT_EQ(share({0.2f, 0.5f, 3.9f}, {3.9f, 0.5f, 3.9f}), 0);  // past it
 }
 
-TEST(Changes, ReceiversAreReadBySomeOnly) {
+TEST(Changes, ReceiversCountToo) {
   // The same geometry, another side: a wall that has no receivers any more.
   Scene scene = test::room_with_crate();
   const SmallWorld before(scene);
@@ -60,8 +58,7 @@ TEST(Changes, ReceiversAreReadBySomeOnly) {
   for (CellContents& c : after.contents) c.receivers = {};
   const Changes changes(before.contents, after);
   const Trace trace = ray(before.contents.grid, {2, 1.5f, 3}, {2, 0.1f, 3});
-  EXPECT_EQ(changes.share(trace, Reads::kGeometry), 0);
-  EXPECT_EQ(changes.share(trace, Reads::kGeometryAndReceivers), 1);
+  EXPECT_EQ(changes.share(trace), 1);
 }
 
 TEST(Changes, WhatIsAddedBesideTheLevelIsSeenThroughTheSky) {
@@ -73,17 +70,15 @@ TEST(Changes, WhatIsAddedBesideTheLevelIsSeenThroughTheSky) {
   test::identify(&scene);
   const SmallWorld after(scene);
   const Changes changes(before.contents, after.contents);
-  EXPECT_EQ(changes.share(ray_to_sky(before.contents.grid, {0, 0.1f, 0}, {0, 1, 0}), Reads::kGeometry), 1);
-  EXPECT_EQ(changes.share(ray(before.contents.grid, {0, 0.1f, 0}, {1, 0, 1}), Reads::kGeometry), 0);
+  EXPECT_EQ(changes.share(ray_to_sky(before.contents.grid, {0, 0.1f, 0}, {0, 1, 0})), 1);
+  EXPECT_EQ(changes.share(ray(before.contents.grid, {0, 0.1f, 0}, {1, 0, 1})), 0);
 }
 
 TEST(Changes, OtherCellsOfTheWorldCannotBeCompared) {
   const SmallWorld world(test::room_with_crate());
   WorldContents other = world.contents;
   ++other.grid.level;
-  EXPECT_EQ(Changes(world.contents, other)
-                .share(ray(world.contents.grid, {0.2f, 0.2f, 0.2f}, {0.3f, 0.3f, 0.3f}), Reads::kGeometry),
-            1);
+  EXPECT_EQ(Changes(world.contents, other).share(ray(world.contents.grid, {0.2f, 0.2f, 0.2f}, {0.3f, 0.3f, 0.3f})), 1);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 
 #include "core/base/sampling.h"
 #include "core/probes/links.h"
@@ -18,7 +19,7 @@ using test::kInfinity;
 std::vector<float> row_of(const GatherLevel& level, VisibilityCache* cache, const GatherPoint& point,
                           const GatherOptions& options, GatherStats* stats = nullptr) {
   std::vector<float> row(level.probes.size() * static_cast<size_t>(sh_count(options.order)), 0.0f);
-  Gatherer gatherer(*level.tracer, cache, {level.probes, level.ids}, options);
+  Gatherer gatherer(*level.tracer, cache, nullptr, {level.probes, level.ids}, options);
   const GatherStats s = gatherer.add_row(point, row);
   if (stats != nullptr) *stats = s;
   return row;
@@ -178,13 +179,53 @@ TEST(Gather, AClosedRoomOfUniformRadianceGivesPi) {
 TEST(Gather, AddsToTheRowAndStartsAnew) {
   const GatherLevel level = crate_level();
   const GatherOptions options{2, 36, true};
-  Gatherer gatherer(*level.tracer, nullptr, {level.probes, level.ids}, options);
+  Gatherer gatherer(*level.tracer, nullptr, nullptr, {level.probes, level.ids}, options);
   std::vector<float> first(4 * 9, 0.0f), again(4 * 9, 0.0f);
   gatherer.add_row(level.point(50, 3, 4), first);
   gatherer.add_row(level.point(90, 4, 0), again);
   std::fill(again.begin(), again.end(), 0.0f);
   gatherer.add_row(level.point(50, 3, 4), again);
   EXPECT_EQ(first, again);
+}
+
+TEST(Gather, WhatIsNearIsReadFromItsOwnTexel) {
+  const GatherLevel level = crate_level();
+  const ReceiverSearch surfaces(level.scene, level.layout, level.receivers);
+  const GatherOptions far{2, 256, true}, near{2, 256, true, 0.5f};
+  uint64_t near_rays = 0;
+  for (uint32_t r = 0; r < level.receivers.all.size(); r += 7) {
+    const GatherPoint point = level.point(r, 4, 0);
+    Gatherer gatherer(*level.tracer, nullptr, &surfaces, {level.probes, level.ids}, near);
+    std::vector<float> row(4 * 9, 0.0f);
+    const GatherStats stats = gatherer.add_row(point, row);
+
+    // Its rays again, by hand.
+    std::map<uint32_t, uint32_t> expected;
+    Rng rng(point.seed);
+    uint64_t rays = 0;
+    for (uint32_t i = 0; i < 256; ++i) {
+      const GatherRay ray = gather_ray(point, i, strata_of(256), &rng);
+      const Hit hit = level.tracer->closest(ray.origin, ray.direction);
+      if (!hit || hit.t >= 0.5f) continue;
+      const uint32_t texel = surfaces.locate(hit);
+      ASSERT_NE(texel, Receivers::kNone);
+      ++expected[texel];
+      ++rays;
+    }
+    ASSERT_EQ(gatherer.near().size(), expected.size());
+    for (const NearTexel& n : gatherer.near()) EXPECT_EQ(n.rays, expected.at(n.receiver));
+    near_rays += rays;
+
+    // The uniform field 1: what is not near comes from the probes.
+    double uniform = 0;
+    for (size_t p = 0; p < 4; ++p) uniform += static_cast<double>(row[p * 9] * kShUniform);
+    const double seen = 1 - static_cast<double>(rays + stats.unseen) / 256;
+    EXPECT_NEAR(uniform, static_cast<double>(kPi) * seen, 1e-5);
+    if (rays == 0) {
+      EXPECT_EQ(row, row_of(level, nullptr, point, far));
+    }
+  }
+  EXPECT_GT(near_rays, 100u);
 }
 
 TEST(Gather, WhatNoProbeSeesIsCounted) {

@@ -30,6 +30,7 @@ class SightTest : public ::testing::Test {
       cell.objects = {object};
       cell.receivers = {{0, c}};
       cell.uniform = {0};
+      cell.near_counts = {0};
       CellChunk::Cluster cluster;
       cluster.receivers = 1;
       cluster.probes = {0};
