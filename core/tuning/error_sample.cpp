@@ -19,6 +19,11 @@ absl::Status cancelled() { return absl::CancelledError("cancelled while choosing
 
 uint64_t batch_seed(uint64_t seed, uint32_t batch) { return hash_combine(seed, kSeed + batch); }
 
+/// Single-sided surfaces do not from behind.
+bool shines(const Scene& scene, const Hit& hit) {
+  return hit && (!hit.back || scene.materials[scene.objects[hit.object].triangles[hit.triangle].material].double_sided);
+}
+
 /// Mean over lights of √(error² ÷ energy): what is estimated without bias may come out below zero for one of them.
 double relative(const std::vector<double>& error2, const std::vector<double>& energy, double typical) {
   double sum = 0, weights = 0;
@@ -52,14 +57,17 @@ absl::StatusOr<std::unique_ptr<ErrorSample>> ErrorSample::create(const RayTracer
     const Plan& plan = ground;
     const Receiver& r = plan.receivers.all[out->receivers_[i]];
     GatherPoint point = make_cell_task(plan, scene, cell_of_one(out->receivers_[i])).receivers.front();
+    std::vector<float> radiance(lights);
     for (uint32_t b = 0; b < kBatches; ++b) {
       float* e = &out->truth_[(i * kBatches + b) * lights];
       Rng rng(batch_seed(r.seed, b));
       const Strata strata = strata_of(kBatchRays);
       for (uint32_t k = 0; k < kBatchRays; ++k) {
         const GatherRay ray = gather_ray(point, k, strata, &rng);
-        const auto radiance = out->radiance(ray.origin, ray.direction);
-        for (size_t l = 0; l < radiance.size(); ++l) e[l] += kPi / kBatchRays * radiance[l];
+        const Hit hit = tracer.closest(ray.origin, ray.direction);
+        if (!shines(scene, hit)) continue;
+        out->lights_.radiance_at(tracer, hit, radiance);
+        for (size_t l = 0; l < lights; ++l) e[l] += kPi / kBatchRays * radiance[l];
       }
     }
   });
@@ -79,10 +87,7 @@ absl::StatusOr<std::unique_ptr<ErrorSample>> ErrorSample::create(const RayTracer
 
 std::span<const float> ErrorSample::radiance(Vec3 origin, Vec3 direction) const {
   const Hit hit = tracer_.closest(origin, direction);
-  if (!hit) return {};
-  const Scene& scene = tracer_.scene();
-  const Object& object = scene.objects[hit.object];
-  if (hit.back && !scene.materials[object.triangles[hit.triangle].material].double_sided) return {};
+  if (!shines(tracer_.scene(), hit)) return {};
   const uint32_t texel = search_.locate(hit);
   return texel == Receivers::kNone ? std::span<const float>() : lights_.radiance(texel);
 }

@@ -1,6 +1,6 @@
 // How far a plan's probes are from the truth, measured on a few receivers under a few lights before anything is baked.
 //
-// Truth and model look along the same gather rays and see the same texels, so that their difference is the model's alone.
+// Truth and model look along the same gather rays, so that their difference is the model's alone: what probes blur, and texels.
 #pragma once
 
 #include <array>

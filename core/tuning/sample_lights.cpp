@@ -7,6 +7,7 @@
 #include "core/base/rng.h"
 #include "core/base/sampling.h"
 #include "core/base/sh.h"
+#include "core/receivers/texel_opening.h"
 
 namespace lightloom {
 namespace {
@@ -16,7 +17,7 @@ constexpr uint32_t kTries = 24;      // places per light
 constexpr uint32_t kClearRays = 48;  // that measure how far a place is from any surface
 constexpr float kClear = 0.2f;       // of the default spacing: far enough
 constexpr float kEnclosed = 0.4f;    // share of them that must hit something
-constexpr size_t kSpots = 4;         // every so many lights one is a spot
+constexpr size_t kPoints = 4;        // of a texel, that its radiance is the mean of, at most
 constexpr float kSpotAngle = 0.5f;   // radians from the axis
 
 /// How good a place is for a lamp: distance to the nearest surface, `enough` at most; below 0 where most of what is around is
@@ -41,20 +42,51 @@ Vec3 place_of(const RayTracer& tracer, const Plan& ground, uint32_t first, uint3
   return r.point.position + direction * (reach * (0.25f + 0.5f * rng->next_float()));
 }
 
+/// Towards the sky from a receiver among first..end−1; zero if none was found that sees it.
+Vec3 to_sky(const RayTracer& tracer, const Plan& ground, uint32_t first, uint32_t end, Rng* rng) {
+  for (uint32_t i = 0; i < 8 * kTries; ++i) {
+    const Receiver& r = ground.receivers.all[first + rng->next_below(end - first)];
+    const float u = rng->next_float(), v = rng->next_float();
+    const Vec3 direction = leave(r.point, square_to_cosine_hemisphere(u, v));
+    if (direction.y > 0 && !tracer.occluded(r.point.position, direction, std::numeric_limits<float>::infinity())) {
+      return direction;
+    }
+  }
+  return {};
+}
+
+enum class Kind { kOpen, kClose, kSpot, kSun };
+constexpr Kind kKinds[] = {Kind::kOpen, Kind::kClose, Kind::kOpen, Kind::kSpot,
+                           Kind::kOpen, Kind::kClose, Kind::kOpen, Kind::kSun};
+
 Light light_at(const RayTracer& tracer, const Plan& ground, size_t index, size_t count) {
   const uint64_t n = ground.receivers.all.size();
   const uint32_t first = static_cast<uint32_t>(index * n / count);
   const uint32_t end = std::max(first + 1, static_cast<uint32_t>((index + 1) * n / count));
   const float spacing = default_spacing(tracer.scene().bounds()), enough = kClear * spacing;
+  const Kind kind = kKinds[index % std::size(kKinds)];
   Rng rng(hash_combine(kSeed, index));
   Light light;
+  if (kind == Kind::kSun) {
+    light.direction = -to_sky(tracer, ground, first, end, &rng);
+    light.type = LightType::kDirectional;
+    if (light.direction != Vec3{}) return light;
+    light.type = LightType::kPoint;
+  }
+  if (kind == Kind::kClose) {
+    const Receiver& r = ground.receivers.all[first + rng.next_below(end - first)];
+    const float reach = tracer.closest(r.point.position, r.point.geometric).t;
+    light.position =
+        r.point.position + r.point.geometric * std::min(spacing * (0.1f + 0.2f * rng.next_float()), 0.5f * reach);
+    return light;
+  }
   float best = -std::numeric_limits<float>::infinity();
   for (uint32_t i = 0; i < kTries && best < enough; ++i) {
     const Vec3 place = place_of(tracer, ground, first, end, spacing, &rng);
     const float good = quality(tracer, place, enough);
     if (good > best) best = good, light.position = place;
   }
-  if (index % kSpots == kSpots - 1) {
+  if (kind == Kind::kSpot) {
     light.type = LightType::kSpot;
     const float u = rng.next_float(), v = rng.next_float();
     light.direction = square_to_sphere(u, v);
@@ -69,6 +101,12 @@ float irradiance(const RayTracer& tracer, const Light& light, const ShadingPoint
   const float cosine = dot(p.normal, in.to_light);
   if (!(cosine > 0) || dot(p.geometric, in.to_light) <= 0 || in.irradiance == Vec3{}) return 0;
   return tracer.occluded(p.position, in.to_light, in.distance) ? 0 : in.irradiance.x * cosine;
+}
+
+/// ρ/π, the mean of the channels.
+float reflectance(const Scene& scene, const Object& object, uint32_t triangle, float b1, float b2) {
+  const Vec3 albedo = albedo_at(scene, object, object.triangles[triangle], b1, b2);
+  return (albedo.x + albedo.y + albedo.z) / (3 * kPi);
 }
 
 }  // namespace
@@ -92,14 +130,29 @@ absl::StatusOr<SampleLights> SampleLights::create(const RayTracer& tracer, const
     const Receiver& r = ground.receivers.all[i];
     const Texel& texel = ground.receivers.grids[r.object].texels[r.texel];
     const Object& object = scene.objects[r.object];
-    const Vec3 albedo = albedo_at(scene, object, object.triangles[texel.triangle], texel.b1, texel.b2);
-    const float reflected = (albedo.x + albedo.y + albedo.z) / (3 * kPi);
-    for (size_t l = 0; l < lights; ++l) {
-      out.radiance_[i * lights + l] = reflected * irradiance(tracer, out.lights_[l], r.point);
+    const float reflected = reflectance(scene, object, texel.triangle, texel.b1, texel.b2);
+    const std::vector<ShadingPoint> all =
+        texel_points(object, ground.layout.uv[r.object], ground.receivers.grids[r.object], texel, r.back, r.parts);
+    const size_t points = std::min(all.size(), kPoints);
+    for (size_t p = 0; p < points; ++p) {
+      // Of sixteen, one of each row and column.
+      const ShadingPoint& point = all[(p * all.size() / points + p) % all.size()];
+      for (size_t l = 0; l < lights; ++l) {
+        out.radiance_[i * lights + l] +=
+            reflected / static_cast<float>(points) * irradiance(tracer, out.lights_[l], point);
+      }
     }
   });
   if (!done) return cancelled;
   return out;
+}
+
+void SampleLights::radiance_at(const RayTracer& tracer, const Hit& hit, std::span<float> out) const {
+  const Scene& scene = tracer.scene();
+  const Object& object = scene.objects[hit.object];
+  const ShadingPoint point = shading_point(object, hit.triangle, hit.b1, hit.b2, hit.back);
+  const float reflected = reflectance(scene, object, hit.triangle, hit.b1, hit.b2);
+  for (size_t l = 0; l < lights_.size(); ++l) out[l] = reflected * irradiance(tracer, lights_[l], point);
 }
 
 }  // namespace lightloom
