@@ -55,9 +55,9 @@ TEST(Golden, Surface) {
 TEST(Golden, Manifest) {
   const auto bytes = encode_manifest(sample_manifest());
   EXPECT_EQ(excerpt(bytes),
-            "4c4f4f4d 02000000 02000000 02000000 01000000 02000000 03000000 11000000 33333333 33333333 "
+            "4c4f4f4d 03000000 02000000 02000000 01000000 02000000 03000000 11000000 33333333 33333333 "
             "33333333 33333333 33333333 33333333 33333333 33333333");
-  EXPECT_EQ(sha256(bytes).hex(), "25d34d13a6b7f9930cbd18eb69196691bf0c7cb5ab35fcb20d33cffb5341285f");
+  EXPECT_EQ(sha256(bytes).hex(), "b30a60fa84e9b9594cfa5ea2d815e885075da8ca28ec149a3e88a6f04e40ab5e");
 }
 
 }  // namespace
