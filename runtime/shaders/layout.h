@@ -182,6 +182,7 @@ struct SettlePush {
 };
 struct ImagePush {
   uint width, height, layers;
+  float exposure;  // factor on E
 };
 
 #ifdef __cplusplus
