@@ -61,6 +61,7 @@ absl::StatusOr<AssetIndex> AssetIndex::create(const Manifest& m, std::pmr::memor
                                     " relight rays per probe; bake with at most " + std::to_string(kMaxRelightRays));
   }
   AssetIndex index(memory);
+  index.spacing_ = m.params.spacing;
   index.order_ = static_cast<uint32_t>(m.params.order);
   index.rays_ = static_cast<uint32_t>(m.params.relight_rays);
   index.width_ = static_cast<uint32_t>(m.width);

@@ -32,7 +32,7 @@ class AssetIndex {
   };
   struct Cell {
     ChunkRef chunk;
-    int32_t level = 0;  ///< of the octree: it covers [i, i+1)·2^level metres on each axis
+    int32_t level = 0;  ///< of the octree: it covers [i, i+1)·cell_side() on each axis
     GridCell place{};
     Aabb bounds;  ///< of its receivers
     uint32_t receivers = 0;
@@ -53,6 +53,7 @@ class AssetIndex {
                                                                          std::pmr::memory_resource* memory);
   static absl::StatusOr<AssetIndex> create(const Manifest& manifest, std::pmr::memory_resource* memory);
 
+  float spacing() const { return spacing_; }  ///< of probes, metres
   uint32_t order() const { return order_; }
   uint32_t rays() const { return rays_; }
   uint32_t surface_elements() const { return surface_elements_; }
@@ -123,6 +124,7 @@ class AssetIndex {
     Digest digest;
     Target target;
   };
+  float spacing_ = 0;
   uint32_t order_ = 0, rays_ = 0, surface_elements_ = 0, width_ = 0, height_ = 0;
   std::pmr::vector<Object> objects_;
   std::pmr::vector<uint32_t> by_id_;  ///< into objects_, sorted by id

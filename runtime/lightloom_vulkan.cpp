@@ -148,9 +148,11 @@ lightloom_result lightloom_vulkan_record(lightloom_runtime* runtime, VkCommandBu
                                          const lightloom_frame_info* info) {
   return lightloom::with_vulkan_asset(runtime, [&](lightloom::VulkanBackend& backend) -> absl::Status {
     static constexpr lightloom_frame_info kDefault{};
-    if (commands == VK_NULL_HANDLE || (info != nullptr && (info->struct_size < sizeof(lightloom_frame_info) ||
-                                                           info->direct_source > LIGHTLOOM_DIRECT_LIGHTS))) {
-      return absl::InvalidArgumentError("the command buffer is null, or lightloom_frame_info has a wrong struct_size");
+    if (commands == VK_NULL_HANDLE ||
+        (info != nullptr && (info->struct_size < sizeof(lightloom_frame_info) ||
+                             info->direct_source > LIGHTLOOM_DIRECT_LIGHTS || info->reserved != 0))) {
+      return absl::InvalidArgumentError(
+          "the command buffer is null, or lightloom_frame_info has a wrong struct_size, direct_source or reserved");
     }
     return backend.record(commands, info == nullptr ? kDefault : *info);
   });

@@ -14,7 +14,7 @@ namespace lightloom {
 namespace {
 
 constexpr uint32_t kMagic = 0x4d4f4f4cu;  // "LOOM"
-constexpr uint32_t kVersion = 2;
+constexpr uint32_t kVersion = 3;
 
 struct Header {
   uint32_t magic, version;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -71,8 +72,12 @@ struct ProbeEntry {
   bool operator==(const ProbeEntry&) const = default;
 };
 
+/// Of a cell of the octree that bake cells are cut from, metres. A multiple of the probes' spacing: a level that is scaled
+/// with its parameters has the same cells.
+inline double cell_side(float spacing, int32_t level) { return std::ldexp(static_cast<double>(spacing), level); }
+
 struct CellEntry {
-  int32_t level = 0;  ///< the octree cell covers [i, i+1)·2^level metres on each axis
+  int32_t level = 0;  ///< the octree cell covers [i, i+1)·cell_side() on each axis
   GridCell cell{};
   Aabb bounds;  ///< of its receivers
   uint32_t receivers = 0;

@@ -44,10 +44,12 @@ absl::Status check_place(const Aabb& bounds, float texels_per_metre) {
       std::to_string(offset) + " m off surfaces; move the level to the origin, or lower --texels-per-metre");
 }
 
-/// Octree over the world: the root is the same for every level, so a leaf depends on the receivers above it only.
+/// Octree over the world: the root is the same for every level of one spacing, so a leaf depends on the receivers above it
+/// only.
 class Octree {
  public:
-  Octree(const Receivers& receivers, uint32_t limit) : receivers_(receivers), limit_(limit) {}
+  Octree(const Receivers& receivers, const BakeParams& params)
+      : receivers_(receivers), spacing_(params.spacing), limit_(static_cast<uint32_t>(params.cell_receivers)) {}
 
   std::vector<PlannedCell> leaves(std::vector<uint32_t> all) {
     split(kRootLevel + 1, {0, 0, 0}, std::move(all), true);
@@ -55,8 +57,8 @@ class Octree {
   }
 
  private:
-  static constexpr int32_t kRootLevel = 20;   // cells of 2^20 m around the origin
-  static constexpr int32_t kLeafLevel = -10;  // a heap of receivers within a millimetre stays one cell
+  static constexpr int32_t kRootLevel = 20;   // a million spacings around the origin
+  static constexpr int32_t kLeafLevel = -10;  // a heap of receivers within a thousandth of one stays one cell
 
   void split(int32_t level, GridCell cell, std::vector<uint32_t> receivers, bool root) {
     if (receivers.empty()) return;
@@ -64,7 +66,7 @@ class Octree {
       leaves_.push_back({level, cell, std::move(receivers)});
       return;
     }
-    const double side = std::ldexp(1.0, level - 1);
+    const double side = cell_side(spacing_, level - 1);
     std::array<std::vector<uint32_t>, 8> children;
     std::array<GridCell, 8> cells{};
     for (size_t o = 0; o < 8; ++o) {
@@ -88,6 +90,7 @@ class Octree {
   }
 
   const Receivers& receivers_;
+  float spacing_;
   uint32_t limit_;
   std::vector<PlannedCell> leaves_;
 };
@@ -180,7 +183,7 @@ absl::StatusOr<Plan> finish_plan(const RayTracer& tracer, Plan plan, const BakeC
     if (ra.object == rb.object) return ra.key < rb.key;
     return scene.objects[ra.object].id < scene.objects[rb.object].id;
   });
-  plan.cells = Octree(plan.receivers, static_cast<uint32_t>(plan.params.cell_receivers)).leaves(std::move(all));
+  plan.cells = Octree(plan.receivers, plan.params).leaves(std::move(all));
   plan.grid = WorldGrid::around(scene.bounds(), plan.params.spacing);
   return plan;
 }

@@ -31,7 +31,7 @@ struct BakeControl {
 
 /// A world octree cell with fewer receivers than BakeParams::cell_receivers: one task.
 struct PlannedCell {
-  int32_t level = 0;  ///< covers [i, i+1)·2^level metres
+  int32_t level = 0;  ///< covers [i, i+1)·cell_side()
   GridCell cell{};
   std::vector<uint32_t> receivers;  ///< indices into Receivers::all, sorted by (object id, key)
 };

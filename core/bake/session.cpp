@@ -85,7 +85,7 @@ BakeSession::BakeSession(const RayTracer& tracer, Plan plan)
       plan_(std::move(plan)),
       plan_digest_(hash_plan(plan_, tracer.scene())),
       probes_(positions_of(plan_.placement.probes)),
-      search_(tracer.scene(), plan_.layout, plan_.receivers),
+      search_(tracer, plan_.layout, plan_.receivers),
       bytes_(bytes_of(tracer, plan_)) {
   if (plan_.params.method == BakeMethod::kSl17) return;
   cache_ = std::make_unique<VisibilityCache>(tracer, plan_.layout, plan_.receivers.grids, probes_);

@@ -39,7 +39,7 @@ absl::StatusOr<RelightRays> RelightRays::trace(const RayTracer& tracer, const Pl
   out.elements_.resize(probes.size() * out.count_);
   std::map<Digest, uint32_t> object_of;
   for (uint32_t o = 0; o < scene.objects.size(); ++o) object_of[scene.objects[o].id] = o;
-  const ReceiverSearch search(scene, plan.layout, plan.receivers);
+  const ReceiverSearch search(tracer, plan.layout, plan.receivers);
   const bool done = parallel_for(probes.size(), control.stage("relight rays"), [&](uint64_t p) {
     const RelightChunk chunk = bake_relight(tracer, plan, search, probes[p]).chunk;
     // Rays are numbered by the sides of the chunk's objects, one after the other.

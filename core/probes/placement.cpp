@@ -22,26 +22,20 @@ constexpr size_t kTestReceivers = 64;  // per cell, for repair
 constexpr uint32_t kTestRaysSide = 4;
 constexpr double kRepairShare = 0.01;  // unseen share of a cell's test rays that calls for repair
 
-uint64_t cell_seed(const Cell& c) {
-  uint64_t h = 0x9b0be;
-  for (const int32_t i : c) h = hash_combine(h, static_cast<uint64_t>(static_cast<uint32_t>(i)));
-  return h;
-}
-
 FirstHits look_around(const RayTracer& tracer, Vec3 p) {
   FirstHits f;
   for (uint32_t i = 0; i < kSpaceRays; ++i) f.add(tracer.closest(p, sphere_direction(i, kSpaceRays)));
   return f;
 }
 
-/// Point n of the cell's list: near the centre first, then spread by the R3 sequence (Roberts 2018).
+/// Point n of the cell's list, the same in all cells: a level that is moved by cells has the same probes. The middle, then
+/// spread by the R3 sequence (Roberts 2018).
 Vec3 candidate(const Cell& cell, float spacing, int n) {
-  Rng rng(cell_seed(cell));
-  const double j[3] = {rng.next_float(), rng.next_float(), rng.next_float()};
   constexpr double kR3[3] = {0.8191725133961645, 0.6710436067037893, 0.5497004779019703};
   Vec3 p;
   for (int a = 0; a < 3; ++a) {
-    const double u = n == 0 ? 0.375 + 0.25 * j[a] : 0.05 + 0.9 * (j[a] + n * kR3[a] - std::floor(j[a] + n * kR3[a]));
+    const double at = 0.5 + n * kR3[a];
+    const double u = 0.05 + 0.9 * (at - std::floor(at));
     p[a] = static_cast<float>((cell[static_cast<size_t>(a)] + u) * static_cast<double>(spacing));
   }
   return p;

@@ -19,4 +19,11 @@ Space classify(const RayTracer& tracer, const ShadingPoint& point, uint64_t seed
   return 8 * count.hits < count.rays ? Space::kVoid : Space::kOpen;
 }
 
+bool joined(const RayTracer& tracer, const ShadingPoint& a, const ShadingPoint& b) {
+  if (tracer.visible(a.position, b.position)) return true;
+  const float height = kDetour * length(b.position - a.position);
+  const Vec3 above_a = a.position + a.geometric * height, above_b = b.position + b.geometric * height;
+  return tracer.visible(a.position, above_a) && tracer.visible(above_a, above_b) && tracer.visible(above_b, b.position);
+}
+
 }  // namespace lightloom

@@ -33,4 +33,9 @@ enum class Space : uint8_t {
 /// Decides by up to 36 cosine-weighted rays. `seed` names the point.
 Space classify(const RayTracer& tracer, const ShadingPoint& point, uint64_t seed);
 
+/// Whether nothing stands between two points of surfaces that look the same way. Surfaces that bend hide their own points
+/// from each other: there a way above them will do, kDetour of the distance higher than either.
+bool joined(const RayTracer& tracer, const ShadingPoint& a, const ShadingPoint& b);
+inline constexpr float kDetour = 0.5f;  // over an edge between faces 60° apart it takes a third
+
 }  // namespace lightloom

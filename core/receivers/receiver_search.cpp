@@ -3,8 +3,11 @@
 #include <nanoflann.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+
+#include "core/receivers/open_space.h"
 
 namespace lightloom {
 namespace {
@@ -14,6 +17,7 @@ constexpr float kReach = 8;          // texels
 constexpr float kSameWay = 0.5f;     // least cosine between normals
 constexpr float kPlaneWeight = 4;    // of the squared distance from the hit's plane
 constexpr float kObjectPenalty = 4;  // factor on the squared distance for other objects: their colour is theirs
+constexpr size_t kTries = 8;         // receivers, before all are taken to be behind walls
 constexpr float kTexelSpread = 4;    // texels of an object that are larger or smaller than this are bad charts
 
 /// Receivers as nanoflann reads them.
@@ -27,21 +31,35 @@ struct Points {
   }
 };
 
-/// What a search keeps: the candidate of least score, where score(candidate) is no less than its squared distance.
+/// What a search keeps: the kTries candidates of least score, best first, where score(candidate) is no less than its
+/// squared distance.
 template <class Score, class Before>
 struct Best {
   Score score;
   Before before;
-  float least;
-  uint32_t receiver = Receivers::kNone;
+  float bound;  ///< that no score exceeds
+  struct Candidate {
+    float score;
+    uint32_t receiver;
+  };
+  std::array<Candidate, kTries> all{};
+  size_t count = 0;
 
-  size_t size() const { return receiver == Receivers::kNone ? 0 : 1; }
+  size_t size() const { return count; }
   bool full() const { return true; }
+  float worst() const { return count == kTries ? all[count - 1].score : bound; }
   // Ties are looked at too.
-  float worstDist() const { return std::nextafter(least, std::numeric_limits<float>::infinity()); }
+  float worstDist() const { return std::nextafter(worst(), std::numeric_limits<float>::infinity()); }
   bool addPoint(float, uint32_t i) {
-    const float s = score(i);
-    if (s < least || (s == least && receiver != Receivers::kNone && before(i, receiver))) least = s, receiver = i;
+    const Candidate added{score(i), i};
+    const auto better = [&](const Candidate& a, const Candidate& b) {
+      return a.score < b.score || (a.score == b.score && before(a.receiver, b.receiver));
+    };
+    if (!(added.score < bound) || (count == kTries && !better(added, all[count - 1]))) return true;
+    if (count < kTries) ++count;
+    size_t at = count - 1;
+    for (; at > 0 && better(added, all[at - 1]); --at) all[at] = all[at - 1];
+    all[at] = added;
     return true;
   }
 };
@@ -54,8 +72,13 @@ struct ReceiverSearch::Tree {
   nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, Points>, Points, 3, uint32_t> index;
 };
 
-ReceiverSearch::ReceiverSearch(const Scene& scene, const AtlasLayout& layout, const Receivers& receivers)
-    : scene_(scene), layout_(layout), receivers_(receivers), tree_(std::make_unique<Tree>(receivers)) {
+ReceiverSearch::ReceiverSearch(const RayTracer& tracer, const AtlasLayout& layout, const Receivers& receivers)
+    : tracer_(tracer),
+      scene_(tracer.scene()),
+      layout_(layout),
+      receivers_(receivers),
+      tree_(std::make_unique<Tree>(receivers)) {
+  const Scene& scene = scene_;
   for (size_t o = 0; o < scene.objects.size(); ++o) {
     double area = 0, texels = 0;
     for (uint32_t t = 0; t < layout.uv[o].corners.size(); ++t) {
@@ -94,15 +117,16 @@ uint32_t ReceiverSearch::locate(const Hit& hit, float* reach) const {
   const Vec2 p = c[0] * (1 - hit.b1 - hit.b2) + c[1] * hit.b1 + c[2] * hit.b2;
   const int px = std::clamp(static_cast<int>(std::floor(p.x)), 0, uv.width - 1);
   const int py = std::clamp(static_cast<int>(std::floor(p.y)), 0, uv.height - 1);
-  const uint32_t own =
-      receivers_.find(hit.object, static_cast<uint32_t>(((hit.back ? uv.height : 0) + py) * uv.width + px));
+  uint32_t own = receivers_.find(hit.object, static_cast<uint32_t>(((hit.back ? uv.height : 0) + py) * uv.width + px));
   if (own != Receivers::kNone) {
     const Receiver& r = receivers_.all[own];
     const float distance = length(r.point.position - y.position);
-    if (faces_alike(r) && distance <= kOwnReach * texel) {
-      looked_at(distance);
+    const bool near = faces_alike(r) && distance <= kOwnReach * texel;
+    if (near && joined(tracer_, y, r.point)) {
+      looked_at((1 + kDetour) * distance);
       return own;
     }
+    if (!near) own = Receivers::kNone;
   }
 
   // The nearest one.
@@ -123,9 +147,15 @@ uint32_t ReceiverSearch::locate(const Hit& hit, float* reach) const {
   Best<decltype(score), decltype(before)> best{score, before, reach2};
   const float at[3] = {y.position.x, y.position.y, y.position.z};
   tree_->index.findNeighbors(best, at, nanoflann::SearchParams());
-  // A score is no less than the squared distance. Its own receiver, were it there, would be nearer than this.
-  looked_at(std::max(std::sqrt(best.least), kOwnReach * texel));
-  return best.receiver;
+  // A score is no less than the squared distance, and ways between rise above both ends by kDetour. Its own receiver, were
+  // it there, would be nearer than this.
+  looked_at((1 + kDetour) * std::max(std::sqrt(best.worst()), kOwnReach * texel));
+  for (size_t i = 0; i < best.count; ++i) {
+    const uint32_t receiver = best.all[i].receiver;
+    if (joined(tracer_, y, receivers_.all[receiver].point)) return receiver;
+  }
+  // Where a surface is too crumpled for its texels, all is behind walls: better its own texel's than none.
+  return own;
 }
 
 }  // namespace lightloom

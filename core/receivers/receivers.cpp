@@ -56,7 +56,7 @@ absl::StatusOr<Receivers> find_receivers(const RayTracer& tracer, const AtlasLay
       r.texel = items[i].texel;
       r.back = side == 1;
       r.key = (side * static_cast<uint32_t>(grid.height) + texel.y) * static_cast<uint32_t>(grid.width) + texel.x;
-      r.seed = hash_combine(object.id.low64(), r.key);
+      r.seed = receiver_seed(object, r.key);
       const TexelOpening opening(tracer, object, layout.uv[r.object], grid, texel, r.back, r.seed);
       r.point = opening.middle();
       r.parts = opening.parts();

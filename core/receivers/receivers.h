@@ -20,8 +20,11 @@ struct Receiver {
   bool back = false;
   ShadingPoint point;  ///< TexelOpening::middle()
   uint16_t parts = 0;  ///< TexelOpening::parts(): where its rays start
-  uint64_t seed = 0;   ///< of (object id, key): all randomness of this receiver comes from here
+  uint64_t seed = 0;   ///< receiver_seed()
 };
+
+/// All randomness of a receiver comes from here, and what of its texel is open, in bakes and in the truth.
+inline uint64_t receiver_seed(const Object& object, uint32_t key) { return hash_combine(object.id.low64(), key); }
 
 struct Receivers {
   static constexpr uint32_t kNone = 0xffffffffu;

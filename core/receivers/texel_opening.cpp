@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <optional>
+#include <utility>
 
 #include "core/receivers/open_space.h"
 #include "core/receivers/surface_point.h"
@@ -38,29 +39,53 @@ TexelOpening::TexelOpening(const RayTracer& tracer, const Object& object, const 
                            const Texel& texel, bool back, uint64_t seed)
     : tracer_(tracer), object_(object), uv_(uv), texel_(texel), back_(back) {
   if (!anything_stands_on_it()) return;
-  std::array<std::optional<ShadingPoint>, kTexelParts * kTexelParts> middles;
-  std::array<bool, kTexelParts * kTexelParts> open{};
-  bool solid = false;
+  constexpr size_t kParts = kTexelParts * kTexelParts;
+  std::array<std::optional<ShadingPoint>, kParts> middles;
+  std::array<bool, kParts> open{};
   for (int i = 0; i < kTexelParts * kTexelParts; ++i) {
     const size_t k = static_cast<size_t>(i);
     middles[k] = part_middle(object, uv, grid, texel, back, i);
     if (!middles[k]) continue;
     // What a straight line joins is the same space: most parts need no more than one ray.
-    const auto joined = [&](int j) {
+    const auto seen_from = [&](int j) {
       const auto& other = middles[static_cast<size_t>(j)];
       return other && tracer.visible(middles[k]->position, other->position);
     };
-    if (i % kTexelParts > 0 && joined(i - 1)) {
+    if (i % kTexelParts > 0 && seen_from(i - 1)) {
       open[k] = open[k - 1];
-    } else if (i >= kTexelParts && joined(i - kTexelParts)) {
+    } else if (i >= kTexelParts && seen_from(i - kTexelParts)) {
       open[k] = open[k - kTexelParts];
     } else {
       open[k] = classify(tracer, *middles[k], hash_combine(seed, k)) != Space::kSolid;
     }
-    solid |= !open[k];
-    if (open[k]) open_.push_back(*middles[k]), parts_ = static_cast<uint16_t>(parts_ | 1u << i);
   }
-  whole_ = !solid || open_.empty();
+
+  // Something thin may keep open parts apart, such as a door that is shut: the space that has most of them counts.
+  std::array<size_t, kParts> space{};  // of each part: the first one that it is joined with
+  std::array<size_t, kParts> size{};   // of each space, parts
+  for (size_t k = 0; k < kParts; ++k) {
+    space[k] = k;
+    if (!open[k]) continue;
+    size[k] = 1;
+    for (size_t j = k; j-- > 0;) {
+      const size_t a = std::min(space[j], space[k]), b = std::max(space[j], space[k]);
+      if (!open[j] || a == b || !joined(tracer, *middles[j], *middles[k])) continue;
+      std::replace(space.begin(), space.begin() + static_cast<std::ptrdiff_t>(k) + 1, b, a);
+      size[a] += std::exchange(size[b], 0);
+    }
+  }
+  const size_t largest = static_cast<size_t>(std::max_element(size.begin(), size.end()) - size.begin());
+  whole_ = true;
+  for (size_t k = 0; k < kParts; ++k) {
+    if (!middles[k]) continue;
+    if (open[k] && space[k] == largest) {
+      open_.push_back(*middles[k]);
+      parts_ = static_cast<uint16_t>(parts_ | 1u << k);
+    } else {
+      whole_ = false;
+    }
+  }
+  if (open_.empty()) whole_ = true;
   if (whole_) parts_ = 0;
 }
 

@@ -1,5 +1,5 @@
 // The part of a texel that lies in open space. A texel may reach into a wall that stands on its surface; light is to be
-// averaged over what can be seen.
+// averaged over what can be seen. Nor may it be averaged over both sides of a sheet.
 #pragma once
 
 #include <cstdint>
@@ -25,11 +25,11 @@ class TexelOpening {
   TexelOpening(const RayTracer& tracer, const Object& object, const LightmapUv& uv, const TexelGrid& grid,
                const Texel& texel, bool back, uint64_t seed);
 
-  /// Whether all of the texel counts: nothing stands on it, or no part of it was found open.
+  /// Whether all of the texel counts: nothing stands on it, or keeps parts of it apart, or no part of it was found open.
   bool whole() const { return whole_; }
   /// Whether a point of the texel lies in open space.
   bool contains(const SurfacePoint& point) const;
-  /// A bit for each of its parts that lie in open space; 0 if it is whole.
+  /// A bit for each of its parts that lie in the same open space, the one that has most of them; 0 if it is whole.
   uint16_t parts() const { return parts_; }
   /// The middle of the open part that lies most in the midst of them; the texel's own point if it is whole.
   ShadingPoint middle() const;

@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/receivers/receivers.h"
 #include "core/receivers/texel_opening.h"
 #include "core/scene/picture.h"
 
@@ -110,10 +111,12 @@ absl::StatusOr<ReferenceResult> reference_lightmap(const RayTracer& tracer, cons
     const TexelGrid& grid = grids[items[i].object];
     const Texel& texel = grid.texels[items[i].texel];
     const LightmapUv& uv = layout.uv[items[i].object];
-    const uint64_t key =
-        hash_combine(hash_combine(object.id.low64(), static_cast<uint64_t>(texel.y) << 32 | texel.x), options.seed);
+    const uint64_t texel_seed = receiver_seed(object, texel.y * static_cast<uint32_t>(grid.width) + texel.x);
+    const uint64_t key = hash_combine(texel_seed, options.seed);
     std::optional<TexelOpening> opening;  // Cycles knows of none
-    if (options.footprint == Footprint::kTexel) opening.emplace(tracer, object, uv, grid, texel, /*back=*/false, key);
+    if (options.footprint == Footprint::kTexel) {
+      opening.emplace(tracer, object, uv, grid, texel, /*back=*/false, texel_seed);
+    }
     const auto point = [&](Sample2 jitter) {
       const SurfacePoint s = sample_texel(object, uv, grid, texel, jitter, options.footprint,
                                           [&](const SurfacePoint& p) { return opening->contains(p); });

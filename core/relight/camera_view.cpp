@@ -33,7 +33,7 @@ absl::StatusOr<Image> render_view(const RayTracer& tracer, const SurfaceElements
                                   std::span<const Vec3> irradiance, const Camera& camera, const ViewOptions& options) {
   LL_ASSIGN_OR_RETURN(const int height, image_height(camera, options.width));
   Image image(options.width, height, {"R", "G", "B"});
-  const ReceiverSearch search(tracer.scene(), elements.layout, elements.receivers);
+  const ReceiverSearch search(tracer, elements.layout, elements.receivers);
   const uint32_t side = strata(options.samples);
   const bool done = parallel_for(static_cast<uint64_t>(height), options.parallel, [&](uint64_t row) {
     for (int x = 0; x < options.width; ++x) {

@@ -69,7 +69,7 @@ absl::StatusOr<SurfaceElements> load_surface_elements(const std::filesystem::pat
         const Texel& t = receivers.grids[o].texels[texel];
         r.texel = static_cast<uint32_t>(texel);
         r.point = shading_point(scene.objects[o], t.triangle, t.b1, t.b2, r.back);
-        r.seed = hash_combine(entry.id.low64(), key);
+        r.seed = receiver_seed(scene.objects[o], key);
         receivers.all.push_back(r);
       }
     }

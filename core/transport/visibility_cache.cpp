@@ -139,12 +139,12 @@ VisibilityCache::Surface VisibilityCache::make_surface(Patch patch) const {
   out.normal = centre.geometric;
   Rng rng(hash_combine(object.id.low64(), patch - rows_[o].first));
   for (uint32_t i = 0; i < kSamples; ++i) {
-    // Near the corners: what passes between two samples is rarer than what passes beside them.
+    // At the corners, nearly: what passes between two samples is rarer than what passes beside them.
     const Sample2 at = stratified(i, 2, &rng);
-    const auto outwards = [](float x) { return x < 0.5f ? 0.2f * x : 1 - 0.2f * (1 - x); };
+    const auto outwards = [](float x) { return x < 0.5f ? 0.02f * x : 1 - 0.02f * (1 - x); };
     const SurfacePoint s = sample_texel(object, layout_.uv[o], grids_[o], texel, {outwards(at.u), outwards(at.v)});
     out.samples[i] = shading_point(object, s.triangle, s.b1, s.b2, back).position;
-    // A sample is at least four fifths of the way from the centre to its corner. What is farther is traced.
+    // Samples are just short of the corners, or where the surface ends. What is farther is traced.
     const Vec3 d = out.samples[i] - out.centre;
     out.reach2 = std::max(out.reach2, 1.6f * dot(d, d));
   }

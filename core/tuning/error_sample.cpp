@@ -39,7 +39,7 @@ double relative(const std::vector<double>& error2, const std::vector<double>& en
 }  // namespace
 
 ErrorSample::ErrorSample(const RayTracer& tracer, const Plan& ground)
-    : tracer_(tracer), ground_(ground), search_(tracer.scene(), ground.layout, ground.receivers) {}
+    : tracer_(tracer), ground_(ground), search_(tracer, ground.layout, ground.receivers) {}
 
 absl::StatusOr<std::unique_ptr<ErrorSample>> ErrorSample::create(const RayTracer& tracer, const Plan& ground,
                                                                  const Parallel& how) {

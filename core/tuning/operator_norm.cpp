@@ -146,7 +146,7 @@ absl::StatusOr<std::vector<double>> operator_norms(const RayTracer& tracer, cons
 
   const std::vector<Vec3> positions = positions_of(plan.placement.probes);
   VisibilityCache cache(tracer, plan.layout, plan.receivers.grids, positions);
-  const ReceiverSearch surfaces(scene, plan.layout, plan.receivers);
+  const ReceiverSearch surfaces(tracer, plan.layout, plan.receivers);
   const float near = near_field(plan.params);
   std::vector<double> norms(receivers.size());
   const bool done = parallel_for(receivers.size(), how, [&](uint64_t i) {

@@ -95,6 +95,10 @@ typedef struct lightloom_frame_info {
   VkImageView shadow_maps;
   VkImageLayout shadow_layout;
   uint32_t shadow_map_size; /* texels along a side */
+  /* The image holds E times this, finite and > 0; 0: 1. An engine that exposes its light beforehand keeps E within what
+   * fp16 holds (6e-8 to 65504). The buffer of E is not scaled. When it changes, all of the image is written anew. */
+  float image_exposure;
+  uint32_t reserved; /* 0 */
 } lightloom_frame_info;
 
 /* Records one frame, outside of a render pass. `info` null: all zero.
@@ -117,7 +121,7 @@ typedef struct lightloom_vulkan_outputs {
   VkBuffer irradiance; /* S x 3 floats, storage and transfer source */
   VkDeviceSize irradiance_bytes;
   VkBuffer direct; /* S x 3 floats: what lightloom_set_direct or our direct pass wrote */
-  /* E in the lightmap's layout, alpha 1 at valid texels and 0 at those that are filled from neighbours (two texels
+  /* E times image_exposure in the lightmap's layout, alpha 1 at valid texels and 0 at those that are filled from neighbours (two texels
    * around each chart); layer 0: fronts, layer 1: backs. Row 0 is v = 0. Always in VK_IMAGE_LAYOUT_GENERAL once a
    * frame is recorded. Null without image_format. */
   VkImage image;

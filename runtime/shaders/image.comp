@@ -1,4 +1,4 @@
-// E in the lightmap's layout. LL_FORMAT is the image's, LL_LARGEST its largest number: it saturates, as infinity would
+// E times the exposure in the lightmap's layout. LL_FORMAT is the image's, LL_LARGEST its largest number: it saturates, as infinity would
 // spread under bilinear filtering.
 #version 450
 #include "layout.h"
@@ -19,6 +19,6 @@ void main() {
     value = vec4(irradiance[3 * s], irradiance[3 * s + 1], irradiance[3 * s + 2], entry < kDilated ? 1.0 : 0.0);
   }
   const uint in_layer = t % texels;
-  value.rgb = clamp(value.rgb, -LL_LARGEST, LL_LARGEST);
+  value.rgb = clamp(value.rgb * push.exposure, -LL_LARGEST, LL_LARGEST);
   imageStore(image, ivec3(in_layer % push.width, in_layer / push.width, t / texels), value);
 }

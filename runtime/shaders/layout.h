@@ -189,6 +189,7 @@ struct SettlePush {
 };
 struct ImagePush {
   uint width, height, layers;
+  float exposure;  // factor on E
 };
 
 #ifdef __cplusplus

@@ -51,7 +51,12 @@ Sight::Sight(const AssetIndex& index)
 
 uint32_t Sight::find_cell(Vec3 position) const {
   for (const int32_t level : levels_) {
-    const auto along = [&](int axis) { return static_cast<int32_t>(std::floor(std::ldexp(position[axis], -level))); };
+    const double side = cell_side(index_.spacing(), level);
+    const auto along = [&](int axis) {
+      constexpr double kFarthest = INT32_MAX;
+      return static_cast<int32_t>(
+          std::clamp(std::floor(static_cast<double>(position[axis]) / side), -kFarthest, kFarthest));
+    };
     const std::pair place(level, GridCell{along(0), along(1), along(2)});
     const auto it = std::lower_bound(by_place_.begin(), by_place_.end(), place,
                                      [&](uint32_t c, const auto& p) { return place_of(index_.cells()[c]) < p; });

@@ -188,6 +188,7 @@ class VulkanAsset {
   bool cleared_ = false;      ///< arrays are initialised
   bool reset_ = false;        ///< E is to be set to 0
   bool image_stale_ = true;   ///< all of the image is to be written
+  float exposure_ = 1;        ///< of the image
   bool smooth_ = false;       ///< targets hold what E goes towards
   uint64_t chunk_bytes_ = 0;  ///< that the newest frame copies
   uint32_t lit_ = 0;          ///< versions of cells and probes, each of which is buried once

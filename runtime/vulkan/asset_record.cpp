@@ -108,6 +108,14 @@ absl::Status VulkanAsset::record(VkCommandBuffer commands, const lightloom_frame
        info.direct_offset % context_->limits.minStorageBufferOffsetAlignment != 0)) {
     return absl::InvalidArgumentError("direct_buffer is null or direct_offset is not aligned");
   }
+  if (!(info.image_exposure >= 0) || !std::isfinite(info.image_exposure)) {
+    return absl::InvalidArgumentError("image_exposure must be finite and positive, or 0, which stands for 1");
+  }
+  const float exposure = info.image_exposure > 0 ? info.image_exposure : 1;
+  if (kind == FrameKind::kWhole && exposure != exposure_) {
+    exposure_ = exposure;
+    image_stale_ = true;
+  }
   recorded_ = frame;
   chunk_bytes_ = 0;
   free_graves(frame);
@@ -372,7 +380,7 @@ void VulkanAsset::record_image(VkCommandBuffer commands) {
   }
   const Pass pass = options_.image_format == VK_FORMAT_R32G32B32A32_SFLOAT ? Pass::kImage32 : Pass::kImage16;
   const uint32_t layers = image_stale_ ? kImageLayers : map_layers_;
-  pipelines_->bind(commands, pass, image_set_, gpu::ImagePush{index_.width(), index_.height(), layers});
+  pipelines_->bind(commands, pass, image_set_, gpu::ImagePush{index_.width(), index_.height(), layers, exposure_});
   if (image_stale_) {
     pipelines_->dispatch(commands, pipelines_->groups_of(uint64_t{layers} * index_.width() * index_.height()));
     image_stale_ = map_table_.pending_bytes() > 0;

@@ -52,7 +52,7 @@ int run(int argc, char** argv) {
   const double before = bare_seconds();
   std::vector<Vec3> probes;
   for (const Probe& p : plan.placement.probes) probes.push_back(p.position);
-  const ReceiverSearch surfaces(scene, plan.layout, plan.receivers);
+  const ReceiverSearch surfaces(*tracer, plan.layout, plan.receivers);
   VisibilityCache cache(*tracer, plan.layout, plan.receivers.grids, probes);
   std::vector<GatherStats> stats(tasks.size());
   std::atomic<uint64_t> trace_bytes{0};

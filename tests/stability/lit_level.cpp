@@ -208,7 +208,7 @@ Image picture(const BakedLevel& level, const Field& e, const View& view, float* 
   constexpr uint32_t kSide = 2;  // points per pixel, squared
   const Camera camera = camera_of(*level.scene, view);
   Image out(kPictureWidth, value_or_die(image_height(camera, kPictureWidth)), {"R", "G", "B"});
-  const ReceiverSearch search(*level.scene, level.elements.layout, level.elements.receivers);
+  const ReceiverSearch search(*level.tracer, level.elements.layout, level.elements.receivers);
   parallel_for(static_cast<uint64_t>(out.height), {}, [&](uint64_t row) {
     for (int x = 0; x < out.width; ++x) {
       Vec3 sum;

@@ -47,7 +47,7 @@ TEST(StabilityUnexpectedLights, EmissiveDoor) {
     return [=](const Receiver& r) { return r.point.position.x > lo && r.point.position.x < hi; };
   };
   check({Case::kSealedRooms, "leak, past a shut emissive door",
-         mean(*level, e, x_within(3.049f, 7)) / mean(*level, e, x_within(-1, 2.951f)), 1e-3, 0.02});
+         mean(*level, e, x_within(3.049f, 7)) / mean(*level, e, x_within(-1, 2.951f)), 1e-3});
 }
 
 TEST(StabilityUnexpectedLights, SunThroughASlit) {

@@ -150,8 +150,8 @@ uint64_t bytes_of(const std::vector<uint32_t>& receivers) {
   for (const CellEntry& c : m.cells) {
     const auto inside = [&](uint32_t i) {
       for (int a = 0; a < 3; ++a) {
-        if (std::floor(std::ldexp(all[i].point.position[a], -c.level)) !=
-            static_cast<float>(c.cell[static_cast<size_t>(a)]))
+        if (std::floor(static_cast<double>(all[i].point.position[a]) / cell_side(m.params.spacing, c.level)) !=
+            static_cast<double>(c.cell[static_cast<size_t>(a)]))
           return false;
       }
       return true;

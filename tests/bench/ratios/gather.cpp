@@ -27,7 +27,7 @@ struct Level {
     params.texels_per_metre = 4;
     return or_exit(make_plan(*tracer, params, {}));
   }();
-  ReceiverSearch surfaces{scene, plan.layout, plan.receivers};
+  ReceiverSearch surfaces{*tracer, plan.layout, plan.receivers};
   std::vector<CellTask> cells;
   std::vector<Vec3> probes;
 };

@@ -2,6 +2,7 @@
 // layers.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 
@@ -112,6 +113,44 @@ TEST(Engine, ImageShowsEAndFillsGutters) {
   }
   EXPECT_GT(filled, 0u);
   EXPECT_GT(empty, 0u);
+}
+
+TEST(Engine, ImageIsExposed) {
+  SyntheticAsset asset = testing::random_asset({});
+  int32_t x = 0;
+  for (ObjectEntry& o : asset.manifest.objects) {
+    o.x = x;
+    x += o.width;
+  }
+  asset.manifest.width = x;
+  asset.manifest.height = 24;
+  Engine engine(VK_FORMAT_R32G32B32A32_SFLOAT);
+  engine.load(asset);
+  engine.light(testing::random_light(engine.outputs().surface_elements, 3));
+  lightloom_frame_info info{};
+  info.struct_size = sizeof info;
+  for (int frame = 0; frame < 60; ++frame) engine.frame();  // until frames have nothing to do
+  const uint64_t frames = engine.stats().frames;
+  engine.frame();
+  ASSERT_EQ(engine.stats().frames, frames);
+  const std::vector<Vec3> e = engine.read_vec3(engine.outputs().irradiance);
+  const std::vector<float> image = engine.read_image();
+  ASSERT_TRUE(std::any_of(image.begin(), image.end(), [](float v) { return v > 1.5f; }));
+  for (const float exposure : {4.0f, 0.25f, 0.0f}) {  // exact; 0: none
+    info.image_exposure = exposure;
+    engine.frame(&info);
+    const std::vector<float> exposed = engine.read_image();
+    for (size_t i = 0; i < image.size(); ++i) {
+      ASSERT_EQ(exposed[i], i % 4 == 3 || exposure == 0 ? image[i] : exposure * image[i]) << exposure << ' ' << i;
+    }
+    EXPECT_EQ(engine.read_vec3(engine.outputs().irradiance), e) << "the buffer is not exposed";
+  }
+  for (const float exposure : {-1.0f, INFINITY, NAN}) {
+    info.image_exposure = exposure;
+    engine.run([&](VkCommandBuffer commands) {
+      EXPECT_EQ(lightloom_vulkan_record(engine.runtime(), commands, &info), LIGHTLOOM_ERROR_INVALID_ARGUMENT);
+    });
+  }
 }
 
 /// A row of four surface elements at (i, 0, 0) that look up, and no probes.

@@ -9,6 +9,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/base/half.h"
@@ -167,6 +168,11 @@ class Engine {
       context_.vk.CmdPipelineBarrier(commands, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, VK_PIPELINE_STAGE_TRANSFER_BIT, 0, 0,
                                      nullptr, 0, nullptr, 1, &barrier);
       copy_image(commands, out.image, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, to, 1, &region);
+      // As it was: the next frame writes it in that layout.
+      barrier.dstAccessMask = 0;
+      std::swap(barrier.oldLayout, barrier.newLayout);
+      context_.vk.CmdPipelineBarrier(commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, 0, 0,
+                                     nullptr, 0, nullptr, 1, &barrier);
     });
     if (!halfs) return image;
     std::vector<Half> packed(values);

@@ -103,9 +103,9 @@ TEST(Manifest, EveryFlippedBitIsRejected) {
 TEST(Manifest, MagicAndVersion) {
   const Bytes good = encode_manifest(sample_manifest());
   EXPECT_THAT(error_of(poke<uint32_t>(good, 0, 0)), HasSubstr("does not start with LOOM"));
-  const auto newer = decode_manifest(poke<uint32_t>(good, 4, 3));
+  const auto newer = decode_manifest(poke<uint32_t>(good, 4, 4));
   EXPECT_EQ(newer.status().code(), absl::StatusCode::kUnimplemented);
-  EXPECT_THAT(std::string(newer.status().message()), HasSubstr("version 3"));
+  EXPECT_THAT(std::string(newer.status().message()), HasSubstr("version 4"));
 }
 
 TEST(Manifest, EveryCountIsChecked) {

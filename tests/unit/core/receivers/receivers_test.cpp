@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <set>
 #include <string>
 #include <utility>
 
 #include "core/receivers/receiver_search.h"
+#include "core/receivers/texel_opening.h"
 #include "tests/support/test_scenes.h"
 
 namespace lightloom {
@@ -41,7 +43,7 @@ struct World {
   }
   World(const World&) = delete;
 
-  uint32_t locate(const Hit& hit) const { return ReceiverSearch(scene, layout, receivers).locate(hit); }
+  uint32_t locate(const Hit& hit) const { return ReceiverSearch(*tracer, layout, receivers).locate(hit); }
   uint32_t object(const std::string& name) const { return test::object_named(scene, name); }
   int count(const std::string& name, bool back) const {
     const uint32_t o = object(name);
@@ -216,12 +218,20 @@ TEST(Locate, ExactWhereTheTexelIsAReceiver) {
   }
 }
 
+/// Of the floor's receivers, only those that `keep` says true of stay.
+void cut_holes(World* w, const std::function<bool(const Receiver&)>& keep) {
+  std::vector<bool> kept;
+  for (const Receiver& r : w->receivers.all) kept.push_back(r.object != w->object("floor") || keep(r));
+  w->receivers.retain(kept);
+}
+
 TEST(Locate, NearestElse) {
-  const World w(test::room_with_crate(), 10);
+  World w(test::closed_box({4, 3, 4}), 10);
+  cut_holes(&w, [](const Receiver& r) { return mix64(r.seed) % 4 == 0; });
   const uint32_t floor = w.object("floor");
   const LightmapUv& uv = w.layout.uv[floor];
   ASSERT_EQ(uv.width, 40);
-  const ReceiverSearch search(w.scene, w.layout, w.receivers);
+  const ReceiverSearch search(*w.tracer, w.layout, w.receivers);
   int fallbacks = 0;
   for (uint32_t t = 0; t < 2; ++t) {
     for (float b1 = 0.01f; b1 < 1; b1 += 0.023f) {
@@ -241,7 +251,7 @@ TEST(Locate, NearestElse) {
           best = std::min(best, distance(r));
         }
         const uint32_t located = search.locate(hit);
-        ASSERT_NE(located, Receivers::kNone) << "the crate is 15 texels wide";
+        ASSERT_NE(located, Receivers::kNone);
         // Its own texel's, or the nearest.
         const bool own = w.receivers.all[located].key == static_cast<uint32_t>(y * 40 + x);
         EXPECT_TRUE(own || std::abs(distance(located) - best) < 1e-4f);
@@ -253,7 +263,11 @@ TEST(Locate, NearestElse) {
 }
 
 TEST(Locate, NothingFartherThanEightTexels) {
-  const World w(test::room_with_crate(), 20);  // the crate covers floor texels 20 to 49 in x and z
+  World w(test::closed_box({4, 3, 4}), 20);
+  cut_holes(&w, [](const Receiver& r) {  // texels 20 to 49 in x and z
+    const Vec3 p = r.point.position;
+    return !(p.x > 1 && p.x < 2.5f && p.z > 1 && p.z < 2.5f);
+  });
   const auto locate_at = [&](float x, float z) {
     // The floor's u runs along z and v along x; its triangles are (0, 1, 2) and (0, 2, 3).
     const float u = z / 4, v = x / 4;
@@ -268,6 +282,50 @@ TEST(Locate, NothingFartherThanEightTexels) {
   EXPECT_EQ(locate_at(1.48f, 1.77f), Receivers::kNone) << "texel 29: ten from the edge";
   EXPECT_NE(locate_at(1.37f, 1.77f), Receivers::kNone) << "texel 27: eight from texel 19";
   EXPECT_NE(locate_at(0.52f, 1.77f), Receivers::kNone);
+}
+
+/// A box of 4 m that a curtain cuts in two: at x = 2.03, within texels if there are 10 a metre.
+Scene box_with_curtain() {
+  Scene scene = test::closed_box({4, 3, 4});
+  const uint32_t cloth = test::add_material(&scene, "cloth", {0.5f, 0.5f, 0.5f});
+  scene.materials[cloth].double_sided = true;
+  test::add_wall_object(&scene, "curtain", {2.03f, 0, 0}, {2.03f, 0, 4}, {2.03f, 3, 4}, {2.03f, 3, 0}, cloth);
+  test::identify(&scene);
+  return scene;
+}
+
+TEST(Locate, NeverBehindAWall) {
+  const World w(box_with_curtain(), 10);
+  const ReceiverSearch search(*w.tracer, w.layout, w.receivers);
+  int own_is_behind = 0;
+  for (float x = 1.601f; x < 2.5f; x += 0.01f) {
+    for (float z = 0.05f; z < 4; z += 0.1f) {
+      const Hit hit = w.tracer->closest({x, 1, z}, {0, -1, 0});
+      ASSERT_EQ(hit.object, w.object("floor"));
+      const uint32_t located = search.locate(hit);
+      ASSERT_NE(located, Receivers::kNone) << x << ' ' << z;
+      const float at = w.receivers.all[located].point.position.x;
+      EXPECT_EQ(at > 2.03f, x > 2.03f) << x << ' ' << z << ": found at " << at;
+      own_is_behind += x > 2.03f && x < 2.1f;
+    }
+  }
+  EXPECT_GT(own_is_behind, 100);
+}
+
+TEST(FindReceivers, ATexelThatACurtainCutsStandsForOneSide) {
+  const World w(box_with_curtain(), 10);
+  int cut = 0;
+  for (const Receiver& r : w.receivers.all) {
+    if (r.object != w.object("floor") || !(r.point.position.x > 2) || !(r.point.position.x < 2.1f)) continue;
+    ++cut;
+    EXPECT_NE(r.parts, 0);
+    const TexelGrid& grid = w.receivers.grids[r.object];
+    const Texel& texel = grid.texels[r.texel];
+    const auto from = texel_points(w.scene.objects[r.object], w.layout.uv[r.object], grid, texel, r.back, r.parts);
+    for (const ShadingPoint& p : from) EXPECT_EQ(p.position.x > 2.03f, r.point.position.x > 2.03f);
+    EXPECT_GE(from.size(), 4u);
+  }
+  EXPECT_GE(cut, 30) << "of 40; a few see more of the curtain's back than of anything else, and count as solid";
 }
 
 TEST(Locate, NeverAnotherChartThatSharesTheTexel) {

@@ -190,7 +190,7 @@ TEST(Gather, AddsToTheRowAndStartsAnew) {
 
 TEST(Gather, WhatIsNearIsReadFromItsOwnTexel) {
   const GatherLevel level = crate_level();
-  const ReceiverSearch surfaces(level.scene, level.layout, level.receivers);
+  const ReceiverSearch surfaces(*level.tracer, level.layout, level.receivers);
   const GatherOptions far{2, 256, true}, near{2, 256, true, 0.5f};
   uint64_t near_rays = 0;
   for (uint32_t r = 0; r < level.receivers.all.size(); r += 7) {
