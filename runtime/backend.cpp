@@ -87,7 +87,7 @@ absl::Status Backend::load(DecodedChunk chunk, const Detail& detail) {
     case AssetIndex::Kind::kCell:
       break;
   }
-  limit(&chunk.cell.chunk, detail);
+  limit(&chunk.cell, detail);
   return load_cell(chunk.target.index, chunk.cell, detail);
 }
 

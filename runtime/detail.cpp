@@ -15,9 +15,31 @@ constexpr uint32_t kCoarseRays = 256;
 
 double turn(double x) { return x - std::floor(x); }
 
+void keep_greatest_near_texels(SourceCell* cell) {
+  CellChunk& chunk = cell->chunk;
+  size_t from = 0, to = 0;
+  for (uint16_t& count : chunk.near_counts) {
+    if (count == 0) continue;
+    const auto first = chunk.near_weights.begin() + static_cast<ptrdiff_t>(from), end = first + count;
+    const size_t greatest = static_cast<size_t>(std::max_element(first, end) - chunk.near_weights.begin());
+    const uint32_t sum = std::accumulate(first, end, 0u);
+    chunk.near_texels[to] = chunk.near_texels[greatest];
+    cell->near_elements[to] = cell->near_elements[greatest];
+    chunk.near_weights[to] = static_cast<uint16_t>(std::min(sum, 65535u));  // rounding may exceed it
+    ++to;
+    from += count;
+    count = 1;
+  }
+  chunk.near_texels.resize(to);
+  cell->near_elements.resize(to);
+  chunk.near_weights.resize(to);
+}
+
 }  // namespace
 
-void limit(CellChunk* chunk, const Detail& detail) {
+void limit(SourceCell* cell, const Detail& detail) {
+  if (detail.base) keep_greatest_near_texels(cell);
+  CellChunk* const chunk = &cell->chunk;
   const size_t stride = static_cast<size_t>(sh_stride(static_cast<int>(chunk->order)));
   const bool all_bands = detail.bands > chunk->order;
   chunk->order = std::min(chunk->order, std::max(detail.bands, 1u) - 1);

@@ -18,8 +18,9 @@ struct Detail {
   bool operator==(const Detail&) const = default;
 };
 
-/// Keeps the first columns of each cluster, and of their projection the first bands. `order` is then the lower one.
-void limit(CellChunk* chunk, const Detail& detail);
+/// Keeps the first columns of each cluster, and of their projection the first bands; the chunk's `order` is then the lower one. A
+/// base gives all of a receiver's near field to its greatest texel: less to keep, and no less energy.
+void limit(SourceCell* cell, const Detail& detail);
 
 /// Which of N relight rays stand for all when they are far away: about 256, one of each run of as many successive rays
 /// (a band of equal area), the one nearest to a golden spiral of so few points. All, if N is not much more.

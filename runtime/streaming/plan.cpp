@@ -14,24 +14,26 @@ struct CellModel {
   uint32_t max_rank, bands;
   double band_error;
 };
-constexpr CellModel kCellModels[] = {{0, 1, 1}, {4, 4, 0.135}, {16, 4, 0.135}, {UINT32_MAX, UINT32_MAX, 0}};
+constexpr CellModel kCellModels[] = {{0, 1, 1}, {4, 4, 0.052}, {16, 4, 0.052}, {UINT32_MAX, UINT32_MAX, 0}};
 /// That coarse rays add.
-constexpr double kCoarseRaysError = 0.09;
+constexpr double kCoarseRaysError = 0.053;
 /// What is resident is worth so much more than what is not.
 constexpr double kHysteresis = 1.25;
 
 const CellModel& model_of(CellLevel level) { return kCellModels[static_cast<size_t>(level)]; }
 
 /// What the near fields of a cell take, of which the manifest says nothing: so many entries of 6 bytes may be in the chunk
-/// besides all else.
-uint64_t near_bytes(const AssetIndex::Cell& cell, std::span<const AssetIndex::Cluster> clusters, uint32_t order) {
+/// besides all else. Its base has one for each receiver at most.
+uint64_t near_bytes(const AssetIndex::Cell& cell, std::span<const AssetIndex::Cluster> clusters, uint32_t order,
+                    bool base) {
   const uint64_t stride = static_cast<uint64_t>(sh_stride(static_cast<int>(order)));
   uint64_t others = 64;
   for (const AssetIndex::Cluster& c : clusters) {
     others += 2 * c.rank * (c.probes * stride + (c.receivers + uint64_t{7}) / 8 * 8);
     others += 4 * c.rank + 4 * c.probes + 48 + (8 + 2 + 2) * uint64_t{c.receivers};
   }
-  const uint64_t entries = (cell.chunk.size - std::min(cell.chunk.size, others)) / 6;
+  uint64_t entries = (cell.chunk.size - std::min(cell.chunk.size, others)) / 6;
+  if (base) entries = std::min<uint64_t>(entries, cell.receivers);
   return 8 * entries + 4 * uint64_t{cell.receivers};
 }
 
@@ -48,10 +50,10 @@ uint64_t cell_bytes(std::span<const AssetIndex::Cluster> clusters, uint32_t orde
   return bytes;
 }
 
-/// Relative error of E at a level. What columns leave out falls like 1/(1 + K/3), measured; those that were not baked
+/// Relative error of E at a level. What columns leave out falls like 1/(1 + K/2.5), measured; those that were not baked
 /// cost nothing here.
 double error_at(std::span<const AssetIndex::Cluster> clusters, uint32_t order, CellLevel level) {
-  const auto left = [](uint32_t rank) { return 0.7 / (1 + rank / 3.0); };
+  const auto left = [](uint32_t rank) { return 0.62 / (1 + rank / 2.5); };
   const CellModel& model = model_of(level);
   double error = 0, receivers = 0;
   for (const AssetIndex::Cluster& c : clusters) {
@@ -77,7 +79,7 @@ StreamCosts::StreamCosts(const AssetIndex& index) {
     for (const CellLevel level : {CellLevel::kBase, CellLevel::kSome, CellLevel::kAll}) {
       uint64_t& cost = costs[static_cast<size_t>(level)];
       cost = cell_bytes(index.clusters_of(c), index.order(), model_of(level)) +
-             near_bytes(index.cells()[c], index.clusters_of(c), index.order());
+             near_bytes(index.cells()[c], index.clusters_of(c), index.order(), level == CellLevel::kBase);
       if (level != CellLevel::kBase) cost += costs[static_cast<size_t>(CellLevel::kBase)];
     }
   }

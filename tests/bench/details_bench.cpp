@@ -48,7 +48,7 @@ TEST(DetailsBench, ErrorAgainstBytes) {
     }
     for (uint32_t c = 0; c < level->manifest.cells.size(); ++c) {
       SourceCell cell = value_or_die(source.cell(c));
-      limit(&cell.chunk, detail);
+      limit(&cell, detail);
       for (const auto& cluster : cell.chunk.clusters)
         result.bytes += 2 * (cluster.projection.size() + cluster.reconstruction.size());
       EXPECT_TRUE(runtime.load_cell(c, runtime.pack_cell(cell)).ok());

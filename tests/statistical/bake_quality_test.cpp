@@ -86,7 +86,7 @@ TEST(Cornell, EightRandomLights) {
   BakeParams ours, sl17 = sl17_params();
   sl17.probes = 26;
   sl17.relight_rays = ours.relight_rays;
-  const auto level = bake_cornell(ours, 2.36f), baseline = bake_cornell(sl17, 2.36f);
+  const auto level = bake_cornell(ours, 2.3f), baseline = bake_cornell(sl17, 2.3f);
   ASSERT_EQ(level->manifest.probes.size(), 26u);
   ASSERT_EQ(baseline->manifest.probes.size(), 26u);
   double log_ours = 0, log_sl17 = 0;
@@ -114,7 +114,7 @@ TEST(Cornell, Sl17FollowsItsPublishedTrends) {
     BakeParams params = sl17_params();
     params.probes = probes;
     params.order = order;
-    const auto level = bake_cornell(params, 2.36f);
+    const auto level = bake_cornell(params, 2.3f);
     if (lights.empty()) {
       lights = random_lights(*level->tracer);
       lights.resize(4);

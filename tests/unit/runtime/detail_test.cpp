@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <numeric>
+
 #include <set>
 
 #include "core/base/rng.h"
@@ -80,7 +83,7 @@ class DetailTest : public ::testing::TestWithParam<uint32_t> {
   /// Eight bounces of cells that are cut.
   std::vector<Vec3> decoded(uint32_t max_rank, uint32_t bands) const {
     DecoderAsset decoder = *load_decoder_asset(*source_);
-    for (SourceCell& c : decoder.cells) limit(&c.chunk, {max_rank, bands});
+    for (SourceCell& c : decoder.cells) limit(&c, {max_rank, bands});
     std::vector<Vec3> e(decoder.surface_elements);
     for (int bounce = 0; bounce < 8; ++bounce) e = decode_frame(decoder, light_, e).irradiance;
     return e;
@@ -108,6 +111,28 @@ TEST_P(DetailTest, FewColumnsAndBandsAreThoseOfTheDecoder) {
     EXPECT_EQ(runtime->counts().gpu_bytes, all_bytes);
     load_cells(*runtime, 1);
     EXPECT_LT(runtime->counts().gpu_bytes, all_bytes);
+  }
+}
+
+TEST_P(DetailTest, ABaseKeepsTheEnergyOfNearFields) {
+  for (uint32_t c = 0; c < asset_.manifest.cells.size(); ++c) {
+    const SourceCell whole = *source_->cell(c);
+    SourceCell base = whole;
+    limit(&base, {4, 4, true, true});
+    size_t from = 0, at = 0;
+    for (size_t r = 0; r < whole.chunk.near_counts.size(); ++r) {
+      const uint16_t count = whole.chunk.near_counts[r];
+      ASSERT_EQ(base.chunk.near_counts[r], count > 0);
+      if (count == 0) continue;
+      const auto first = whole.chunk.near_weights.begin() + static_cast<ptrdiff_t>(from);
+      EXPECT_EQ(base.chunk.near_weights[at], std::accumulate(first, first + count, 0));
+      const auto greatest = static_cast<size_t>(std::max_element(first, first + count) - first) + from;
+      EXPECT_EQ(base.near_elements[at], whole.near_elements[greatest]);
+      EXPECT_EQ(base.chunk.near_texels[at], whole.chunk.near_texels[greatest]);
+      from += count;
+      ++at;
+    }
+    EXPECT_EQ(base.near_elements.size(), at);
   }
 }
 

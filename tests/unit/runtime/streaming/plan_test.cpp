@@ -50,7 +50,7 @@ TEST_F(PlanTest, CostsAreTheBlocksBytes) {
     uint64_t before = 0;
     for (const CellLevel level : {CellLevel::kBase, CellLevel::kSome, CellLevel::kAll}) {
       SourceCell cell = *source_->cell(c);
-      limit(&cell.chunk, detail_of(level));
+      limit(&cell, detail_of(level));
       const auto block = make_cell_block(cell, UINT64_MAX, std::pmr::get_default_resource());
       ASSERT_TRUE(block.ok());
       const uint64_t cost = costs.cell(c, level) - before;
