@@ -17,7 +17,7 @@ namespace {
 constexpr int kCoarsest = -6, kFinest = 6;
 constexpr uint64_t kMostProbes = 30000;
 // Shares of the target: their squares sum up to just below one. What probes miss is dear to mend, the rest cheap.
-constexpr double kBandlimit = 0.92, kRelight = 0.15, kCompression = 0.35;
+constexpr double kBandlimit = 0.88, kRelight = 0.15, kCompression = 0.35;
 // The knee: a step that takes k times the probes must take the error down by k^-0.2 at least.
 constexpr double kKnee = 0.2;
 constexpr double kAlmost = 1.04;  // an order whose error is this near to the best one's

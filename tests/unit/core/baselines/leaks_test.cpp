@@ -1,6 +1,5 @@
-// How much light comes through a wall, by method. It depends on where the grids of probes lie to the wall, so it is judged
-// over several. Where DDGI's probes lie evenly on both sides (at 1 m here), it may fall below that of lightloom's
-// compression (1.6e-4 there, 5e-4 at 0.7 m).
+// How much light comes through a wall, by method. That of DDGI depends on where its grid lies to the wall: with probes
+// much nearer than these, and evenly on both sides, it may fall below that of lightloom's compression.
 #include <gtest/gtest.h>
 
 #include "core/baselines/ddgi.h"
@@ -28,7 +27,6 @@ double leak(const PlannedLevel& level, const std::vector<Vec3>& e) {
 
 TEST(Leaks, ThroughAWallOfFiveCentimetres) {
   constexpr int kBounces = 8;
-  double all_plain = 0, all_weighted = 0, all_ours = 0;
   for (const float spacing : {1.0f, 1.3f, 2.0f}) {
     const PlannedLevel level(test::sealed_double_room(0.05f), spacing, 6, 4096);
     const auto sh = value_or_die(make_sh_interpolation(*level.tracer, level.plan, 2, {}));
@@ -43,14 +41,9 @@ TEST(Leaks, ThroughAWallOfFiveCentimetres) {
     std::printf("leak at %.1f m: plain SH %.4f (%d probes), DDGI %.6f (%d probes), lightloom %.2e\n",
                 static_cast<double>(spacing), plain, static_cast<int>(sh->probes()), weighted,
                 static_cast<int>(ddgi->probes()), ours);
-    EXPECT_LT(weighted, plain);
-    EXPECT_LT(ours, 5e-4);
-    all_plain += plain;
-    all_weighted += weighted;
-    all_ours += ours;
+    EXPECT_LT(weighted, plain / 3);
+    EXPECT_GT(weighted, 5 * ours);
   }
-  EXPECT_LT(all_weighted, all_plain / 5);
-  EXPECT_GT(all_weighted, 5 * all_ours);
 }
 
 }  // namespace
