@@ -49,24 +49,34 @@ class Viewer {
   LitLevel& level_;
 };
 
-/// |ΔE| over channels, ÷ mean E.
+/// |ΔE| over channels.
 std::vector<Vec3> difference(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
-  double sum = 0;
-  for (const Vec3& v : b) sum += static_cast<double>(v.x + v.y + v.z) / 3;
-  const float mean = static_cast<float>(std::max(1e-12, sum / static_cast<double>(std::max<size_t>(1, b.size()))));
   std::vector<Vec3> out(a.size());
   for (size_t i = 0; i < a.size(); ++i) {
     const Vec3 d = a[i] - b[i];
-    const float error = std::sqrt(dot(d, d) / 3) / mean;
+    const float error = std::sqrt(dot(d, d) / 3);
     out[i] = {error, error, error};
   }
   return out;
 }
 
-Image heat_map(const Image& error, float scale) {
+/// Mean of what is lit in the picture, over channels: errors are shown relative to it, as most of a level may lie in the dark.
+float mean_in_view(const Image& view) {
+  double sum = 0, lit = 0;
+  for (int y = 0; y < view.height; ++y) {
+    for (int x = 0; x < view.width; ++x) {
+      const Vec3 v = view.rgb(x, y);
+      const double mean = static_cast<double>(v.x + v.y + v.z) / 3;
+      if (mean > 0) sum += mean, ++lit;
+    }
+  }
+  return static_cast<float>(lit > 0 ? sum / lit : 1);
+}
+
+Image heat_map(const Image& error, float unit) {
   Image out(error.width, error.height, {"R", "G", "B"});
   for (int y = 0; y < out.height; ++y) {
-    for (int x = 0; x < out.width; ++x) out.set_rgb(x, y, heat_colour(error.rgb(x, y).x * scale / kHeatTop));
+    for (int x = 0; x < out.width; ++x) out.set_rgb(x, y, heat_colour(error.rgb(x, y).x / unit / kHeatTop));
   }
   return out;
 }
@@ -109,11 +119,12 @@ absl::StatusOr<Sheet> make_sheet(LitLevel* level, const Evaluation& evaluation, 
                                  const std::string& words) {
   Sheet sheet{evaluation.rigs[rig].name, words, {}};
   const std::string at = folder + "/pictures/" + std::to_string(rig) + "-";
-  LL_ASSIGN_OR_RETURN(const Image truth_map, read_exr(truth_path(folder, rig)));
+  LL_ASSIGN_OR_RETURN(Image truth_map, read_exr(truth_path(folder, rig)));
+  dilate(&truth_map);  // it leaves out what lies in solids
   const std::vector<Vec3> truth = from_lightmap(level->elements(), truth_map);
   const Viewer viewer(level);
   LL_ASSIGN_OR_RETURN(Image truth_view, viewer.view(truth));
-  const float to_error = level->scene().cameras.empty() ? 1 : kPi;  // a camera shows E/π
+  const float unit = mean_in_view(truth_view);
   const float exposure = expose(&truth_view);
   Window window;
   LL_RETURN_IF_ERROR(write_png(truth_view, at + "truth.png"));
@@ -123,7 +134,7 @@ absl::StatusOr<Sheet> make_sheet(LitLevel* level, const Evaluation& evaluation, 
     const std::vector<Vec3> e = from_lightmap(level->elements(), lightmap);
     LL_ASSIGN_OR_RETURN(Image view, viewer.view(e));
     LL_ASSIGN_OR_RETURN(const Image error, viewer.view(difference(e, truth)));
-    const Image heat = heat_map(error, to_error);
+    const Image heat = heat_map(error, unit);
     expose(&view, exposure);
     if (sheet.pictures.size() == 1) {  // where the first method, ours, is worst
       window = worst_window(error);

@@ -427,7 +427,7 @@ absl::StatusOr<std::string> report_html(const Page& page) {
 
   if (!page.sheets.empty()) {
     out +=
-        "<h2>Pictures</h2>\n<p>E at each method's default, its error |ΔE| ÷ mean E from 0 <span class=\"ramp\" "
+        "<h2>Pictures</h2>\n<p>E at each method's default, its error |ΔE| ÷ mean E in view from 0 <span class=\"ramp\" "
         "style=\"background:linear-gradient(90deg," +
         css_ramp() + ")\"></span> " + format("%.1f", static_cast<double>(kHeatTop)) +
         " and above, and below both a closer look where the first method errs most.</p>\n";

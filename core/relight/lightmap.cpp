@@ -8,6 +8,8 @@ namespace {
 
 constexpr int kDilation = 4;  // texels
 
+}  // namespace
+
 void dilate(Image* image) {
   std::vector<float>& r = *image->channel("R");
   std::vector<float>& g = *image->channel("G");
@@ -40,8 +42,6 @@ void dilate(Image* image) {
     }
   }
 }
-
-}  // namespace
 
 std::array<int, 2> pixel_of(const SurfaceElements& elements, const Receiver& receiver) {
   const Texel& texel = elements.receivers.grids[receiver.object].texels[receiver.texel];

@@ -10,6 +10,10 @@
 
 namespace lightloom {
 
+/// Gives texels without light of their own (A is 0) that of their neighbours, up to four texels away; A stays. REQUIRES: R, G,
+/// B, A.
+void dilate(Image* image);
+
 /// R, G, B: E of the front side, or the back, W/m²; A: 1 at receivers; area: m² in the texel. Texels without a receiver
 /// next to one (gutters, texels inside solids) are filled from their neighbours, A = 0, so that bilinear filtering stays
 /// clean.
