@@ -16,8 +16,10 @@ namespace {
 // Spacings: the level's default times 2^(−step/2).
 constexpr int kCoarsest = -6, kFinest = 6;
 constexpr uint64_t kMostProbes = 30000;
-// Shares of the target: their squares sum up to just below one. What probes miss is dear to mend, the rest cheap.
-constexpr double kBandlimit = 0.88, kRelight = 0.15, kCompression = 0.35;
+// Shares of the target. What probes miss is dear to mend, the rest cheap; and as estimates are a little low, a tenth is left.
+constexpr double kBandlimit = 0.82, kRelight = 0.15, kCompression = 0.35;
+// Where it is all that can be had, the rest is to add little to it.
+constexpr double kOfBest = 0.92;
 // The knee: a step that takes k times the probes must take the error down by k^-0.2 at least.
 constexpr double kKnee = 0.2;
 constexpr double kAlmost = 1.04;  // an order whose error is this near to the best one's
@@ -113,7 +115,7 @@ class Tuner {
       LL_ASSIGN_OR_RETURN(const Trial* at, trial(s));
       bool fits = false;
       for (int order = 1; order <= kMaxShOrder; ++order) {
-        const double error = at->errors.bandlimit[static_cast<size_t>(order)] / kBandlimit;
+        const double error = at->errors.bandlimit[static_cast<size_t>(order)] / kOfBest;
         if (any && error > 1.02 * out.chosen.parts.total()) continue;  // no better, whatever it takes
         LL_ASSIGN_OR_RETURN(const TunedModel candidate, model(s, order, error));
         least = least > 0 ? std::min(least, candidate.bytes) : candidate.bytes;
@@ -232,7 +234,7 @@ class Tuner {
     LL_ASSIGN_OR_RETURN(const Trial* at, trial(step));
     const int order = at->order(kAlmost * at->best());
     Tuning out;
-    LL_ASSIGN_OR_RETURN(out.chosen, model(step, order, at->errors.bandlimit[static_cast<size_t>(order)] / kBandlimit));
+    LL_ASSIGN_OR_RETURN(out.chosen, model(step, order, at->errors.bandlimit[static_cast<size_t>(order)] / kOfBest));
     LL_RETURN_IF_ERROR(look_ahead(step, &out));
     return out;
   }
@@ -242,7 +244,7 @@ class Tuner {
     LL_ASSIGN_OR_RETURN(const Trial* finer, trial(step + 1));
     const int order = out->chosen.params.order;
     LL_ASSIGN_OR_RETURN(out->next,
-                        model(step + 1, order, finer->errors.bandlimit[static_cast<size_t>(order)] / kBandlimit));
+                        model(step + 1, order, finer->errors.bandlimit[static_cast<size_t>(order)] / kOfBest));
     return absl::OkStatus();
   }
 
