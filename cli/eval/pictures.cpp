@@ -22,9 +22,8 @@ std::vector<Vec3> from_lightmap(const SurfaceElements& elements, const Image& li
   for (size_t i = 0; i < e.size(); ++i) {
     const Receiver& r = elements.receivers.all[i];
     if (r.back) continue;
-    const Texel& texel = elements.receivers.grids[r.object].texels[r.texel];
-    const Placement& at = elements.layout.placements[r.object];
-    e[i] = lightmap.rgb(at.x + static_cast<int>(texel.x), at.y + static_cast<int>(texel.y));
+    const auto [x, y] = pixel_of(elements, r);
+    e[i] = lightmap.rgb(x, y);
   }
   return e;
 }

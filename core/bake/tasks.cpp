@@ -76,6 +76,27 @@ Digest key_of(const Plan& plan, const Scene& scene, const PlannedCell& cell, con
   return h.finish();
 }
 
+/// Where the texels of each object begin in a chunk's numbering: those of `objects` in turn, then `others` that are not among
+/// them, which are appended.
+std::map<uint32_t, uint32_t> number_texels(const Plan& plan, const Scene& scene, std::map<Digest, uint32_t> others,
+                                           std::vector<ChunkObject>* objects) {
+  std::map<uint32_t, uint32_t> base_of;
+  uint32_t end = 0;
+  for (const ChunkObject& known : *objects) {
+    if (const auto it = others.find(known.id); it != others.end()) {
+      base_of[it->second] = end;
+      others.erase(it);
+    }
+    end += 2 * known.width * known.height;
+  }
+  for (const auto& [id, o] : others) {
+    base_of[o] = end;
+    objects->push_back(chunk_object(plan, scene, o));
+    end += 2 * objects->back().width * objects->back().height;
+  }
+  return base_of;
+}
+
 /// Names the near texels of each receiver, in the order of the chunk's. Objects that the chunk does not know yet follow those it
 /// knows.
 void add_near_fields(const Plan& plan, const Scene& scene, int rays, std::span<const uint32_t> order,
@@ -87,20 +108,7 @@ void add_near_fields(const Plan& plan, const Scene& scene, int rays, std::span<c
       object_of.try_emplace(scene.objects[o].id, o);
     }
   }
-  std::map<uint32_t, uint32_t> base_of;
-  uint32_t end = 0;
-  for (const ChunkObject& known : chunk->objects) {
-    if (const auto it = object_of.find(known.id); it != object_of.end()) {
-      base_of[it->second] = end;
-      object_of.erase(it);
-    }
-    end += 2 * known.width * known.height;
-  }
-  for (const auto& [id, o] : object_of) {
-    base_of[o] = end;
-    chunk->objects.push_back(chunk_object(plan, scene, o));
-    end += 2 * chunk->objects.back().width * chunk->objects.back().height;
-  }
+  const auto base_of = number_texels(plan, scene, std::move(object_of), &chunk->objects);
 
   constexpr size_t kMost = 65535;                     // that a count can say
   std::vector<std::pair<uint32_t, uint32_t>> texels;  // and rays: by name, as the scene's order must not show
@@ -278,13 +286,7 @@ RelightResult bake_relight(const RayTracer& tracer, const Plan& plan, const Rece
     const uint32_t o = plan.receivers.all[receiver[i]].object;
     object_of.try_emplace(scene.objects[o].id, o);
   }
-  std::map<uint32_t, uint32_t> base_of;
-  uint32_t base = 0;
-  for (const auto& [id, o] : object_of) {
-    base_of[o] = base;
-    out.objects.push_back(chunk_object(plan, scene, o));
-    base += 2 * out.objects.back().width * out.objects.back().height;
-  }
+  const auto base_of = number_texels(plan, scene, std::move(object_of), &out.objects);
   for (uint32_t i = 0; i < n; ++i) {
     if (receiver[i] == Receivers::kNone) continue;
     const Receiver& r = plan.receivers.all[receiver[i]];

@@ -16,6 +16,6 @@ void main() {
   const uint first = cells[c].first_probe, count = cells[c].probes;
   uint relit = 0u;
   for (uint i = 0; i < count; ++i) relit += stamps[cell_probes[first + i]] == push.frame ? 1u : 0u;
-  for (uint w = 0; w < push.tile_words; ++w) relit |= near_tiles[c * push.tile_words + w] & changed[w];
+  for (uint w = 0; w < push.tile_words && relit == 0u; ++w) relit |= near_tiles[c * push.tile_words + w] & changed[w];
   if (relit > 0u) cell_dirty[c] = 1u;
 }

@@ -274,7 +274,7 @@ absl::Status VulkanAsset::load_cell(uint32_t cell, const SourceCell& source, con
   c.next = *lit;
   c.next->detail = detail;
   c.elements = std::move(elements);
-  const size_t first_tile = size_t{cell} * tile_words_;  // the same in every detail
+  const size_t first_tile = size_t{cell} * tile_words_;  // a base's are among those of finer details
   std::copy(tiles.begin(), tiles.end(), near_table_.as<uint32_t>() + first_tile);
   near_table_.touch(4 * first_tile, 4 * (first_tile + tile_words_));
   ++lit_;

@@ -46,13 +46,7 @@ TEST(StabilityHdr, EScalesWithTheLamps) {
 /// the largest share of the greatest |E|; infinite where the image is not finite.
 double image_error(VkFormat format, float factor, float exposure) {
   lightloom::testing::SyntheticAsset asset = lightloom::testing::random_asset({});
-  int32_t x = 0;
-  for (ObjectEntry& o : asset.manifest.objects) {
-    o.x = x;
-    x += o.width;
-  }
-  asset.manifest.width = x;
-  asset.manifest.height = 24;
+  asset.lay_out_in_a_row(24);
   lightloom::testing::Engine engine(format);
   engine.load(asset);
   SurfaceLight light = lightloom::testing::random_light(engine.outputs().surface_elements, 3);
@@ -77,7 +71,7 @@ double image_error(VkFormat format, float factor, float exposure) {
     for (const uint32_t key : surface.keys) {
       const uint32_t n = static_cast<uint32_t>(o.width * o.height), w = static_cast<uint32_t>(o.width);
       const size_t row = key / n * 24 + key % n / w, column = static_cast<uint32_t>(o.x) + key % n % w;
-      const float* texel = &image[4 * (row * static_cast<uint32_t>(x) + column)];
+      const float* texel = &image[4 * (row * static_cast<uint32_t>(asset.manifest.width) + column)];
       for (int c = 0; c < 3; ++c) {
         worst = std::isfinite(texel[c])
                     ? std::max(worst, static_cast<double>(std::abs(texel[c] / exposure - e[element][c]) / greatest))

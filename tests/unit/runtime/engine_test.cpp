@@ -117,13 +117,7 @@ TEST(Engine, ImageShowsEAndFillsGutters) {
 
 TEST(Engine, ImageIsExposed) {
   SyntheticAsset asset = testing::random_asset({});
-  int32_t x = 0;
-  for (ObjectEntry& o : asset.manifest.objects) {
-    o.x = x;
-    x += o.width;
-  }
-  asset.manifest.width = x;
-  asset.manifest.height = 24;
+  asset.lay_out_in_a_row(24);
   Engine engine(VK_FORMAT_R32G32B32A32_SFLOAT);
   engine.load(asset);
   engine.light(testing::random_light(engine.outputs().surface_elements, 3));

@@ -147,6 +147,15 @@ void SyntheticAsset::add_cell(const CellChunk& chunk, const std::vector<uint32_t
   }
 }
 
+void SyntheticAsset::lay_out_in_a_row(int32_t height) {
+  manifest.width = 0;
+  for (ObjectEntry& o : manifest.objects) {
+    o.x = manifest.width;
+    manifest.width += o.width;
+  }
+  manifest.height = height;
+}
+
 absl::StatusOr<AssetSource> SyntheticAsset::open() const {
   const std::vector<uint8_t> bytes = encode_manifest(manifest);
   return AssetSource::open(bytes, [this](const ChunkRef& ref, std::span<uint8_t> out) -> absl::Status {

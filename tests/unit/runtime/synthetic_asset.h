@@ -21,6 +21,8 @@ struct SyntheticAsset {
   /// Appends the cell; `probes` are indices into manifest.probes.
   void add_cell(const CellChunk& chunk, const std::vector<uint32_t>& probes);
 
+  /// Lays the objects' lightmaps out side by side, in an image so high.
+  void lay_out_in_a_row(int32_t height);
   absl::StatusOr<AssetSource> open() const;
   /// For lightloom_load; `this` is the user.
   static int read_chunk(void* user, const uint8_t digest[32], uint64_t size, void* out);
