@@ -19,6 +19,8 @@ std::vector<Option> BakeOptions::options() {
           {"--retune", "choose anew for --error [0.05] or --budget, whatever the parameters of OUT.loom are", &retune_},
           {"--method", "default, or sl17: Silvennoinen & Lehtinen 2017 as published, to compare with", &method_},
           {"--spacing", "side of a probe cell, metres [0: chosen from the level]", &spacing_},
+          {"--near-field", "metres within which a receiver reads texels instead of probes; 0: none [half of the spacing]",
+           &near_field_},
           {"--order", "spherical harmonics order of the probes, 0 to 9 [7]", &order_},
           {"--probes", "sl17: how many, instead of by --spacing [0: by --spacing]", &probes_},
           {"--links", "probes that each receiver reads [6; sl17: 10 on average]", &links_},
@@ -35,6 +37,7 @@ std::vector<Option> BakeOptions::options() {
 std::string BakeOptions::fixed() const {
   if (method_ == "sl17") return "--method sl17";
   if (spacing_) return "--spacing";
+  if (near_field_) return "--near-field";
   if (order_) return "--order";
   if (probes_) return "--probes";
   if (links_) return "--links";
@@ -65,7 +68,6 @@ absl::StatusOr<BakeParams> BakeOptions::tuned(const RayTracer& tracer, const Bak
     return absl::InvalidArgumentError(
         "--retune chooses for the default method, and the asset is sl17's: add --method default");
   }
-  p.spacing = 0;
   LL_ASSIGN_OR_RETURN(const Tuning chosen, tune(tracer, p, *for_what, control));
   p = chosen.chosen.params;
   if (tuning != nullptr) *tuning = chosen;
@@ -80,10 +82,12 @@ BakeParams BakeOptions::params(const BakeParams* earlier) const {
   };
   // One of each pair decides: what an earlier bake had of the other must not.
   if (spacing_) p.probes = 0;
+  if (spacing_ && p.near_field > 0) p.near_field = BakeParams::kFollows;
   if (probes_) p.spacing = 0;
   if (texels_per_metre_) p.lightmap_size = 0;
   if (lightmap_size_) p.texels_per_metre = 0;
   set(&p.spacing, spacing_);
+  set(&p.near_field, near_field_);
   set(&p.order, order_);
   set(&p.probes, probes_);
   set(&p.links, links_);

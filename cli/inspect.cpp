@@ -107,6 +107,7 @@ nlohmann::json to_json(const Manifest& m, const Summary& s, bool with_cells) {
        {{"method", m.params.method == BakeMethod::kSl17 ? "sl17" : "default"},
         {"order", m.params.order},
         {"spacing", m.params.spacing},
+        {"near_field", m.params.near_field},
         {"links", m.params.links},
         {"rays", m.params.rays},
         {"relight_rays", m.params.relight_rays},
@@ -156,6 +157,7 @@ void print(const Options& o, const Manifest& m, const Summary& s) {
   }
   std::printf("  probes    %zu of order %d, spacing %.3g m, %d relight rays each\n", m.probes.size(), m.params.order,
               static_cast<double>(m.params.spacing), m.params.relight_rays);
+  std::printf("  near      within %.3g m receivers read texels, not probes\n", static_cast<double>(m.params.near_field));
   std::printf("  receivers %llu in %zu cells, %zu clusters\n", static_cast<unsigned long long>(s.receivers),
               m.cells.size(), m.clusters.size());
   std::printf("  rank      %.1f coefficients a receiver (most %u), %.1f probes a cluster\n", s.coefficients, s.max_rank,

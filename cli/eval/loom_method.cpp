@@ -108,6 +108,8 @@ std::string with(const std::string& label, const std::string& more) {
   return label.empty() ? more : label + ", " + more;
 }
 
+constexpr char kNear[] = "near_field";
+
 class LoomMethod : public Method {
  public:
   explicit LoomMethod(BakeMethod method) : method_(method) {}
@@ -131,12 +133,15 @@ class LoomMethod : public Method {
       Variant v;
       if (fineness != 1) v.label = (sl17() ? "probes " : "spacing ") + times(fineness);
       for (const auto& [setting, value] : more) {
-        v.label = with(v.label, setting + " " + std::to_string(static_cast<int>(value)));
+        v.label = with(v.label, setting + " " + (setting == kNear ? times(value) : plain(value)));
       }
       if (sl17()) {
         more["probes"] = std::round(fineness * static_cast<double>(level.plan().placement.probes.size()));
       } else {
         more["spacing"] = fineness * static_cast<double>(level.plan().params.spacing);
+        // It does not follow the spacing here.
+        more.try_emplace(kNear, 1);
+        more[kNear] *= static_cast<double>(level.plan().params.near_field);
       }
       if (v.label.empty()) v.label = "default";
       v.settings = std::move(more);
@@ -151,17 +156,22 @@ class LoomMethod : public Method {
     for (const double f : quick ? std::vector<double>{2, 0.71} : std::vector<double>{4, 2.8, 2, 1.41, 0.71, 0.5})
       add(f, {});
     for (const int order : quick ? std::vector<int>{3} : std::vector<int>{2, 3, 5, 9}) add(1, {{"order", order}});
+    add(1, {{kNear, 0.5}});
     if (quick) return out;
+    for (const double near : {0.0, 2.0}) add(1, {{kNear, near}});
     for (const double f : {2.0, 1.41, 0.71, 0.5}) add(f, {{"order", 4}});
     for (const int links : {3, 4, 10}) add(1, {{"links", links}});
     for (const int rays : {64, 1024}) add(1, {{"rays", rays}});
     for (const int rank : {8, 16, 64}) add(1, {{"max_rank", rank}});
     for (const int rays : {512, 1024, 16384}) add(1, {{"relight_rays", rays}});
     // Along the front: everything a little cheaper, or finer, at once.
+    for (const double f : {2.8, 2.0, 1.41}) add(f, {{kNear, 2}});
+    add(2.8, {{kNear, 2}, {"order", 4}, {"rays", 64}, {"max_rank", 8}, {"relight_rays", 1024}});
     add(2.8, {{"order", 4}, {"rays", 64}, {"max_rank", 8}, {"relight_rays", 1024}});
     add(2, {{"order", 4}, {"rays", 128}, {"max_rank", 16}, {"relight_rays", 1024}});
     add(1.41, {{"order", 5}, {"rays", 128}, {"max_rank", 16}, {"relight_rays", 2048}});
     add(0.71, {{"rays", 512}, {"relight_rays", 2048}, {"max_rank", 48}});
+    add(0.71, {{kNear, 2}, {"rays", 1024}, {"relight_rays", 2048}, {"max_rank", 48}});
     add(0.5, {{"rays", 512}, {"relight_rays", 1024}, {"max_rank", 64}});
     return out;
   }
@@ -176,7 +186,11 @@ class LoomMethod : public Method {
     const auto set = [&](const char* name, int32_t* value) {
       if (const auto it = settings.find(name); it != settings.end()) *value = static_cast<int32_t>(it->second);
     };
-    if (const auto it = settings.find("spacing"); it != settings.end()) params.spacing = static_cast<float>(it->second);
+    const auto set_metres = [&](const char* name, float* value) {
+      if (const auto it = settings.find(name); it != settings.end()) *value = static_cast<float>(it->second);
+    };
+    set_metres("spacing", &params.spacing);
+    set_metres(kNear, &params.near_field);
     set("order", &params.order);
     set("probes", &params.probes);
     set("links", &params.links);
@@ -215,9 +229,7 @@ class TunedMethod : public Method {
     control.threads = level->threads();
     control.cancel = &interrupted();
     const double before = processor_seconds();
-    BakeParams request = level->plan().params;
-    request.spacing = 0;
-    LL_ASSIGN_OR_RETURN(const Tuning tuning, tune(level->tracer(), request, {settings.at("error"), 0}, control));
+    LL_ASSIGN_OR_RETURN(const Tuning tuning, tune(level->tracer(), level->plan().params, {settings.at("error"), 0}, control));
     return LoomModel::create(level, tuning.chosen.params, scratch / "level.loom", tuning.seconds,
                              processor_seconds() - before);
   }

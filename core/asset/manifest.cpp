@@ -14,7 +14,7 @@ namespace lightloom {
 namespace {
 
 constexpr uint32_t kMagic = 0x4d4f4f4cu;  // "LOOM"
-constexpr uint32_t kVersion = 3;
+constexpr uint32_t kVersion = 4;
 
 struct Header {
   uint32_t magic, version;
@@ -54,7 +54,7 @@ struct ClusterRecord {
   uint32_t receivers, rank, probes;
   float error;
 };
-static_assert(sizeof(BakeParams) == 56 && sizeof(Header) == 160 && sizeof(ObjectRecord) == 96 &&
+static_assert(sizeof(BakeParams) == 64 && sizeof(Header) == 168 && sizeof(ObjectRecord) == 96 &&
               sizeof(ProbeRecord) == 72 && sizeof(CellRecord) == 112 && sizeof(ClusterRecord) == 40);
 
 uint32_t crc(std::span<const uint8_t> bytes) {
@@ -73,7 +73,7 @@ absl::Status corrupt(std::string_view why) {
 
 bool valid(const BakeParams& p) {
   return p.method <= BakeMethod::kSl17 && p.probes >= 0 && p.order >= 0 && p.order <= kMaxShOrder && p.spacing > 0 &&
-         std::isfinite(p.spacing) && p.links >= 1 && p.rays >= 1 && p.relight_rays >= 1 && p.max_rank >= 0 &&
+         std::isfinite(p.spacing) && p.near_field >= 0 && std::isfinite(p.near_field) && p.links >= 1 && p.rays >= 1 && p.relight_rays >= 1 && p.max_rank >= 0 &&
          p.threshold >= 0 && std::isfinite(p.threshold) && p.cell_receivers >= 1 && p.texels_per_metre >= 0 &&
          std::isfinite(p.texels_per_metre) && p.lightmap_size >= 0;
 }

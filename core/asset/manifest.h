@@ -22,9 +22,11 @@ enum class BakeMethod : uint32_t {
 
 /// Everything that the baked numbers depend on besides the scene. Recorded in the asset; a rebake uses the same.
 struct BakeParams {
+  static constexpr float kFollows = -1;
   BakeMethod method = BakeMethod::kDefault;
   int32_t order = 7;              ///< SH order n of the probes
   float spacing = 0;              ///< ρ, side of a probe cell, metres; 0 in a request: chosen from the scene
+  float near_field = kFollows;    ///< metres within which a receiver reads texels, not probes; kFollows in a request: from the spacing
   int32_t probes = 0;             ///< SL17: how many; 0: from the spacing
   int32_t links = 6;              ///< k, probes per receiver; SL17: N_overlap, on average
   int32_t rays = 256;             ///< gather rays per receiver
@@ -34,6 +36,7 @@ struct BakeParams {
   int32_t cell_receivers = 1024;  ///< a bake cell holds fewer receivers than this
   float texels_per_metre = 0;     ///< lightmap density; 0 in a request: chosen from the scene
   int32_t lightmap_size = 0;      ///< side of the scene atlas; 0: from texels_per_metre
+  uint32_t reserved = 0;
   uint64_t seed = 0;
 
   bool operator==(const BakeParams&) const = default;
@@ -42,6 +45,7 @@ struct BakeParams {
 inline BakeParams sl17_params() {
   BakeParams p;
   p.method = BakeMethod::kSl17;
+  p.near_field = 0;
   p.links = 10;
   p.threshold = 0.005f;
   p.relight_rays = 8000;

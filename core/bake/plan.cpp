@@ -112,6 +112,12 @@ absl::Status check_params(const BakeParams& p) {
   if (p.method > BakeMethod::kSl17) return bad("--method must be default or sl17");
   if (p.order < 0 || p.order > kMaxShOrder) return bad("--order must be 0 to " + std::to_string(kMaxShOrder));
   if (!(p.spacing >= 0) || !std::isfinite(p.spacing)) return bad("--spacing must be a positive number of metres");
+  if (!(p.near_field >= 0 || p.near_field == BakeParams::kFollows) || !std::isfinite(p.near_field)) {
+    return bad("--near-field must be 0 or a positive number of metres");
+  }
+  if (p.method == BakeMethod::kSl17 && p.near_field != 0) {
+    return bad("--near-field goes with --method default: sl17 has none");
+  }
   if (p.probes < 0 || p.probes > 1 << 20) return bad("--probes must be 0 to 1048576");
   if (p.probes > 0 && p.method != BakeMethod::kSl17) {
     return bad("--probes goes with --method sl17; otherwise --spacing decides");
@@ -144,6 +150,7 @@ absl::StatusOr<Plan> find_ground(const RayTracer& tracer, const BakeParams& requ
   plan.params.rays = static_cast<int32_t>(well_stratified(static_cast<uint32_t>(request.rays)));
   if (plan.params.spacing == 0) plan.params.spacing = default_spacing(scene.bounds());
   LL_RETURN_IF_ERROR(check_spacing(plan.params.spacing, scene.bounds()));
+  if (plan.params.near_field < 0) plan.params.near_field = kNearField * plan.params.spacing;
   LayoutOptions layout_options;
   layout_options.lightmap_size = request.lightmap_size;
   layout_options.texels_per_metre = request.texels_per_metre;

@@ -48,9 +48,10 @@ struct Plan {
 
 /// Probes that a receiver may read besides its k links: the one that sets the support radius, and fallbacks.
 inline constexpr int kFallbacks = 16;
-/// How far the near field of a receiver reaches, metres. A probe blurs what it sees by some 20°, at any distance from the receiver;
-/// what stands next to the receiver fills much of its view, and is blurred just as much. ADR 0008 has what other shares cost.
-inline float near_field(const BakeParams& p) { return p.method == BakeMethod::kSl17 ? 0 : p.spacing / 4; }
+/// How far the near field of a receiver reaches by default, in spacings of probes. A probe blurs what it sees by some 20°, at any
+/// distance from the receiver; what stands next to the receiver fills much of its view, and is blurred just as much. ADR 0008 has
+/// what other shares cost.
+inline constexpr float kNearField = 0.5f;
 
 /// Whether the numbers are in range; make_plan checks them too.
 absl::Status check_params(const BakeParams& request);

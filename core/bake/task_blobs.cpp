@@ -53,7 +53,7 @@ struct ReusedHeader {
   Digest traces;
   uint32_t cells, probes;
 };
-static_assert(sizeof(BakeParams) == 56 && sizeof(PayloadRecord) == 104 && sizeof(ArgumentRecord) == 48 &&
+static_assert(sizeof(BakeParams) == 64 && sizeof(PayloadRecord) == 112 && sizeof(ArgumentRecord) == 48 &&
               sizeof(SummaryRecord) == 64 && sizeof(RefsHeader) == 16 && sizeof(EarlierRecord) == 48 &&
               sizeof(ReusedHeader) == 48 && sizeof(ChunkRef) == 40);
 

@@ -209,7 +209,7 @@ absl::StatusOr<CellResult> bake_cell(const RayTracer& tracer, const Plan& plan, 
   std::vector<Vec3> positions;
   TraceRecorder recorder(task.grid, task.probes.size());
   Gatherer gatherer(tracer, cache, &surfaces, {task.probes, task.probe_ids},
-                    {task.params.order, task.params.rays, !sl17, near_field(task.params)}, &recorder);
+                    {task.params.order, task.params.rays, !sl17, task.params.near_field}, &recorder);
   std::vector<std::vector<NearTexel>> near;
   for (size_t r = 0; r < task.receivers.size(); ++r) {
     if (cancel != nullptr && cancel->cancelled()) return absl::CancelledError("bake of a cell cancelled");

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "core/base/check.h"
 #include "core/base/sampling.h"
@@ -10,6 +11,8 @@
 
 namespace lightloom {
 namespace {
+
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 /// How finely a probe resolves the surface around the hit: the solid angle of a unit of its area, cosθ/d². A probe's
 /// radiance is blurred by a fixed angle, so the nearest one that looks at the hit squarely blurs it least. SL17 weighs by
@@ -46,7 +49,7 @@ Gatherer::Gatherer(const RayTracer& tracer, VisibilityCache* cache, const Receiv
   LL_CHECK(surfaces != nullptr || options.near_field == 0);
 }
 
-Gatherer::Sample Gatherer::shoot(const GatherRay& ray) {
+Gatherer::Sample Gatherer::trace(const GatherRay& ray) {
   ++stats_.gather_rays;
   const Hit hit = tracer_.closest(ray.origin, ray.direction);
   Sample s;
@@ -68,11 +71,11 @@ Gatherer::Sample Gatherer::shoot(const GatherRay& ray) {
     if (hit.t < options_.near_field) {
       const uint32_t texel = surfaces_->locate(hit, &reach);
       if (texel != Receivers::kNone) {
-        s.kind = Sample::kNear;
-        near_.push_back({texel, 1});
+        s.texel = texel;
+        s.distance = hit.t;
       }
     }
-    if (s.kind == Sample::kSurface && cache_ != nullptr) {
+    if ((s.texel == Receivers::kNone || options_.rings) && cache_ != nullptr) {
       float of_patch = 0;
       s.patch = cache_->patch_of(hit, y, &of_patch);
       reach = std::max(reach, of_patch);
@@ -83,7 +86,11 @@ Gatherer::Sample Gatherer::shoot(const GatherRay& ray) {
 }
 
 /// Adds up the rays of each texel.
-void Gatherer::count_near() {
+void Gatherer::find_near(float from, float to) {
+  near_.clear();
+  for (const Sample& s : samples_) {
+    if (s.distance >= from && s.distance < to) near_.push_back({s.texel, 1});
+  }
   std::sort(near_.begin(), near_.end(), [](const NearTexel& a, const NearTexel& b) { return a.receiver < b.receiver; });
   size_t kept = 0;
   for (size_t i = 0; i < near_.size(); ++i) {
@@ -111,14 +118,25 @@ bool Gatherer::sees(uint32_t probe, const Sample& s, Vec3* psi) {
   *psi = sky ? s.direction : normalize(s.position - p);
   if (verdict == VisibilityCache::kSeen) return true;
   ++stats_.visibility_rays;
-  return sky ? !tracer_.occluded(p, s.direction, std::numeric_limits<float>::infinity())
+  return sky ? !tracer_.occluded(p, s.direction, kInfinity)
              : tracer_.visible(s.position, p);
 }
 
 GatherStats Gatherer::add_row(const GatherPoint& receiver, std::span<float> row) {
-  const size_t J = static_cast<size_t>(sh_count(options_.order));
-  LL_CHECK(!receiver.from.empty() && row.size() == probes_.positions.size() * J &&
-           receiver.links <= receiver.near.size());
+  shoot(receiver);
+  find_near(0, options_.near_field);
+  return add_far(options_.near_field, kInfinity, row);
+}
+
+GatherStats Gatherer::add_ring(float from, float to, std::span<float> row) {
+  LL_CHECK(options_.rings && receiver_ != nullptr);
+  find_near(from, to);
+  return add_far(from, to, row);
+}
+
+void Gatherer::shoot(const GatherPoint& receiver) {
+  LL_CHECK(!receiver.from.empty() && receiver.links <= receiver.near.size());
+  receiver_ = &receiver;
   stats_ = {};
   if (recorder_ != nullptr) {
     Aabb origin;
@@ -127,7 +145,6 @@ GatherStats Gatherer::add_row(const GatherPoint& receiver, std::span<float> row)
   }
 
   // Spatial weights w_i(x) (Eq. 10).
-  const uint32_t near = static_cast<uint32_t>(receiver.near.size());
   spatial_.resize(receiver.links);
   for (uint32_t n = 0; n < receiver.links; ++n) {
     const float distance = length(probes_.positions[receiver.near[n]] - receiver.point.position);
@@ -138,11 +155,17 @@ GatherStats Gatherer::add_row(const GatherPoint& receiver, std::span<float> row)
   const Strata strata = strata_of(rays);
   Rng rng(receiver.seed);
   samples_.clear();
-  near_.clear();
   for (uint32_t r = 0; r < rays; ++r) {
-    samples_.push_back(shoot(gather_ray(receiver, r, strata, &rng)));
+    samples_.push_back(trace(gather_ray(receiver, r, strata, &rng)));
   }
-  count_near();
+}
+
+/// Rays at infinity are those that no near field has, whatever their length.
+GatherStats Gatherer::add_far(float from, float to, std::span<float> row) {
+  const GatherPoint& receiver = *receiver_;
+  const size_t J = static_cast<size_t>(sh_count(options_.order));
+  LL_CHECK(row.size() == probes_.positions.size() * J);
+  const uint32_t near = static_cast<uint32_t>(receiver.near.size()), rays = static_cast<uint32_t>(options_.rays);
 
   // K_ij = w_i·V_i·Y_j(ψ_i) ÷ Σ_k w_k·V_k (Eq. 4), the weights w_i(x) perhaps times resolution.
   if (sights_.size() < near) sights_.resize(near);
@@ -150,7 +173,7 @@ GatherStats Gatherer::add_row(const GatherPoint& receiver, std::span<float> row)
   sum_.assign(rays, 0);
   for (uint32_t r = 0; r < rays; ++r) {
     const Sample& s = samples_[r];
-    if (s.kind == Sample::kDead || s.kind == Sample::kNear) continue;
+    if (s.kind == Sample::kDead || s.distance < from || (s.distance >= to && to < kInfinity)) continue;
     for (uint32_t n = 0; n < receiver.links; ++n) {
       Vec3 psi;
       if (!(spatial_[n] > 0) || !sees(receiver.near[n], s, &psi)) continue;
@@ -179,7 +202,7 @@ GatherStats Gatherer::add_row(const GatherPoint& receiver, std::span<float> row)
     }
     accumulator_.flush_into(row.subspan(receiver.near[n] * J, J));
   }
-  return stats_;
+  return std::exchange(stats_, {});
 }
 
 }  // namespace lightloom

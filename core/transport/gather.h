@@ -7,6 +7,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -28,6 +29,7 @@ struct GatherOptions {
   bool weigh_by_resolution = true;
   /// Metres: what is nearer to where a ray starts is read from its own texel; 0: nothing is.
   float near_field = 0;
+  bool rings = false;  ///< add_ring will be called
 };
 
 /// A texel in a receiver's near field: so many of its gather rays hit it, and read no probe.
@@ -82,10 +84,18 @@ class Gatherer {
   /// The near field of the last receiver, each texel once, by its index.
   std::span<const NearTexel> near() const { return near_; }
 
+  /// What a smaller near field would change, of the same rays: shoot() once, then add_ring() for one ring after the other. Rays
+  /// that a near field of `to` metres has, and one of `from` metres has not, are added to `row` as if none had them, and
+  /// near() is their texels. From near_field to infinity: the rays that no near field has.
+  void shoot(const GatherPoint& receiver);
+  GatherStats add_ring(float from, float to, std::span<float> row);
+
  private:
   /// What a gather ray found.
   struct Sample {
-    enum Kind : uint8_t { kSurface, kSky, kNear, kDead } kind = kDead;
+    enum Kind : uint8_t { kSurface, kSky, kDead } kind = kDead;
+    uint32_t texel = Receivers::kNone;  ///< that a near field of more than `distance` reads
+    float distance = std::numeric_limits<float>::infinity();
     VisibilityCache::Patch patch = VisibilityCache::kNoPatch;
     Vec3 position;  ///< of the hit, pushed off, for kSurface
     Vec3 normal;
@@ -99,8 +109,9 @@ class Gatherer {
     Vec3 psi;          ///< ψ_i(ω), unit
   };
 
-  Sample shoot(const GatherRay& ray);
-  void count_near();
+  Sample trace(const GatherRay& ray);
+  void find_near(float from, float to);
+  GatherStats add_far(float from, float to, std::span<float> row);
   bool sees(uint32_t probe, const Sample& sample, Vec3* psi);
 
   const RayTracer& tracer_;
@@ -109,6 +120,7 @@ class Gatherer {
   TraceRecorder* recorder_;
   GatherProbes probes_;
   GatherOptions options_;
+  const GatherPoint* receiver_ = nullptr;
   GatherStats stats_;
   ShAccumulator accumulator_;
   std::vector<Sample> samples_;

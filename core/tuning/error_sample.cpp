@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <set>
 
 #include "core/bake/tasks.h"
 #include "core/tuning/receiver_sample.h"
@@ -125,12 +127,15 @@ double ErrorSample::typical_energy() const {
   return *middle;
 }
 
-absl::StatusOr<ProbeErrors> ErrorSample::measure(const Plan& plan, const Parallel& how) const {
-  constexpr size_t J = kMaxShCount;
-  constexpr size_t kOrders = kMaxShOrder + 1;
+absl::StatusOr<ErrorsByReach> ErrorSample::measure(const Plan& plan, const Parallel& how) const {
+  constexpr size_t J = kMaxShCount, kOrders = kMaxShOrder + 1, kReachCount = kReaches.size();
+  static_assert(kBatchRays == ProbeErrors::kNearRays[0] && kBatches * kBatchRays == ProbeErrors::kNearRays[2]);
   Plan wide = plan;  // all orders at once: a lower one reads a part of the same coefficients
   wide.params.order = kMaxShOrder;
   wide.params.rays = kBatchRays;
+  std::array<float, kReachCount + 1> reach{};
+  for (size_t k = 0; k < kReachCount; ++k) reach[k] = kReaches[k] * plan.params.near_field;
+  reach[kReachCount] = std::numeric_limits<float>::infinity();
   const Scene& scene = tracer_.scene();
   const size_t lights = lights_.count(), count = receivers_.size();
 
@@ -146,95 +151,122 @@ absl::StatusOr<ProbeErrors> ErrorSample::measure(const Plan& plan, const Paralle
   });
   if (!lit) return cancelled();
 
-  // Per receiver and light: the error by order (without the noise of its own rays), that of a batch, unseen, of relight rays.
+  // Per receiver, reach and light: the error by order (without the noise of its own rays), that of a batch, unseen, of relight
+  // rays.
   struct Sums {
     std::array<double, kOrders> error2{};
     double unseen2 = 0, relight2 = 0;
   };
-  std::vector<Sums> sums(count * lights);
+  std::vector<Sums> sums(count * kReachCount * lights);
+  std::vector<std::array<std::array<uint32_t, 3>, kReachCount>> near_texels(count);
   const bool done = parallel_for(count, how, [&](uint64_t i) {
     const Receiver& r = ground_.receivers.all[receivers_[i]];
     const uint32_t own = plan.receivers.find(r.object, r.key);
     if (own == Receivers::kNone) return;  // a back side that this plan drops
     const CellTask task = make_cell_task(wide, scene, cell_of_one(own));
     Gatherer gatherer(tracer_, &cache, &search_, {task.probes, task.probe_ids},
-                      {kMaxShOrder, kBatchRays, true, near_field(wide.params)});
+                      {kMaxShOrder, kBatchRays, true, reach[kReachCount - 1], true});
     std::vector<float> row(task.probes.size() * J);
-    std::vector<double> model(lights * kOrders * kBatches), near(lights), unseen(lights), relight(lights);
+    std::vector<double> model(kReachCount * lights * kOrders * kBatches), near(lights);
+    std::vector<double> unseen(kReachCount), relight(kReachCount * lights);
+    std::array<std::set<uint32_t>, kReachCount> texels;
     for (uint32_t b = 0; b < kBatches; ++b) {
+      const auto of = [&](size_t k, size_t l, size_t n) -> double& {
+        return model[((k * lights + l) * kOrders + n) * kBatches + b];
+      };
       std::fill(row.begin(), row.end(), 0.0f);
       GatherPoint point = task.receivers.front();
       point.seed = batch_seed(r.seed, b);
-      const GatherStats stats = gatherer.add_row(point, row);
-      const double share = static_cast<double>(stats.unseen) / kBatchRays;
-      std::fill(near.begin(), near.end(), 0.0);
-      add_near_field(gatherer.near(), kBatchRays, near);
-      for (size_t l = 0; l < lights; ++l) {
-        double band = near[l];
-        for (int n = 0; n <= kMaxShOrder; ++n) {
-          for (size_t p = 0; p < task.probes.size(); ++p) {
-            const float* alpha = &row[p * J];
-            const float* probe = &lambda[task.probe_ids[p]][l * J];
-            for (int j = n * n; j < (n + 1) * (n + 1); ++j)
-              band += static_cast<double>(alpha[j]) * static_cast<double>(probe[j]);
+      gatherer.shoot(point);
+      uint64_t unseen_rays = 0;
+      // From far to near: each smaller near field leaves a ring more to the probes, and the larger ones have it.
+      for (size_t k = kReachCount; k-- > 0;) {
+        unseen_rays += gatherer.add_ring(reach[k], reach[k + 1], row).unseen;
+        std::fill(near.begin(), near.end(), 0.0);
+        add_near_field(gatherer.near(), kBatchRays, near);
+        unseen[k] += static_cast<double>(unseen_rays) / kBatchRays / kBatches;
+        for (size_t larger = k + 1; larger < kReachCount; ++larger) {
+          for (const NearTexel& n : gatherer.near()) texels[larger].insert(n.receiver);
+          for (size_t l = 0; l < lights; ++l) {
+            for (size_t n = 0; n < kOrders; ++n) of(larger, l, n) += near[l];
           }
-          model[(l * kOrders + static_cast<size_t>(n)) * kBatches + b] = band;
         }
         for (size_t p = 0; p < task.probes.size(); ++p) {
+          const float* alpha = &row[p * J];
+          if (std::all_of(alpha, alpha + J, [](float a) { return a == 0; })) continue;
           const auto& second = other[task.probe_ids[p]];
-          if (second.empty()) continue;
-          double difference = 0;
-          for (size_t j = 0; j < J; ++j) {
-            difference +=
-                static_cast<double>(row[p * J + j]) *
-                (static_cast<double>(lambda[task.probe_ids[p]][l * J + j]) - static_cast<double>(second[l * J + j]));
+          for (size_t l = 0; l < lights; ++l) {
+            const float* probe = &lambda[task.probe_ids[p]][l * J];
+            double band = 0, difference = 0;
+            for (int n = 0; n <= kMaxShOrder; ++n) {
+              for (int j = n * n; j < (n + 1) * (n + 1); ++j) band += static_cast<double>(alpha[j]) * static_cast<double>(probe[j]);
+              of(k, l, static_cast<size_t>(n)) += band;
+            }
+            if (second.empty()) continue;
+            for (size_t j = 0; j < J; ++j) {
+              difference += static_cast<double>(alpha[j]) *
+                            (static_cast<double>(probe[j]) - static_cast<double>(second[l * J + j]));
+            }
+            // Half of the squared difference is one lattice's variance; a quarter of the probes stand for all.
+            relight[k * lights + l] += 4 * 0.5 * difference * difference / kBatches;
           }
-          // Half of the squared difference is one lattice's variance; a quarter of the probes stand for all.
-          relight[l] += 4 * 0.5 * difference * difference / kBatches;
         }
-        unseen[l] += share / kBatches;
+      }
+      for (size_t k = 0; k < kReachCount; ++k) {
+        const auto size = static_cast<uint32_t>(texels[k].size());
+        if (b == 0) near_texels[i][k][0] = size;
+        if (b < 2) near_texels[i][k][1] = size;
+        near_texels[i][k][2] = size;
       }
     }
-    for (size_t l = 0; l < lights; ++l) {
-      Sums& s = sums[i * lights + l];
-      const auto truth = [&](uint32_t b) { return static_cast<double>(truth_[(i * kBatches + b) * lights + l]); };
-      for (size_t n = 0; n < kOrders; ++n) {
-        const double* of = &model[(l * kOrders + n) * kBatches];
-        double mean = 0, square = 0;
-        for (uint32_t b = 0; b < kBatches; ++b) {
-          const double d = of[b] - truth(b);
-          mean += d / kBatches;
-          square += d * d;
+    for (size_t k = 0; k < kReachCount; ++k) {
+      for (size_t l = 0; l < lights; ++l) {
+        Sums& s = sums[(i * kReachCount + k) * lights + l];
+        const auto truth = [&](uint32_t b) { return static_cast<double>(truth_[(i * kBatches + b) * lights + l]); };
+        const double* by_order = &model[(k * lights + l) * kOrders * kBatches];
+        double of_finest = 0;
+        for (size_t n = 0; n < kOrders; ++n) {
+          double mean = 0, square = 0, sum = 0;
+          for (uint32_t b = 0; b < kBatches; ++b) {
+            const double e = by_order[n * kBatches + b], d = e - truth(b);
+            sum += e / kBatches;
+            mean += d / kBatches;
+            square += d * d;
+          }
+          const double variance = (square - kBatches * mean * mean) / (kBatches - 1);
+          s.error2[n] = mean * mean - variance / kBatches;
+          of_finest = sum;
         }
-        const double variance = (square - kBatches * mean * mean) / (kBatches - 1);
-        s.error2[n] = mean * mean - variance / kBatches;
+        s.relight2 = relight[k * lights + l];
+        // What no probe sees is taken to be as bright as what is seen.
+        s.unseen2 = unseen[k] < 1 ? std::pow(of_finest * unseen[k] / (1 - unseen[k]), 2) : std::pow(truth(0), 2);
       }
-      const double* finest = &model[(l * kOrders + kMaxShOrder) * kBatches];
-      double mean = 0;
-      for (uint32_t b = 0; b < kBatches; ++b) mean += finest[b] / kBatches;
-      s.relight2 = relight[l];
-      // What no probe sees is taken to be as bright as what is seen.
-      s.unseen2 = unseen[l] < 1 ? std::pow(mean * unseen[l] / (1 - unseen[l]), 2) : std::pow(truth(0), 2);
     }
   });
   if (!done) return cancelled();
 
-  ProbeErrors out;
-  const auto total = [&](auto&& of) {
-    std::vector<double> by_light(lights);
-    for (size_t i = 0; i < count; ++i) {
-      for (size_t l = 0; l < lights; ++l) by_light[l] += of(sums[i * lights + l]) / static_cast<double>(count);
+  ErrorsByReach all;
+  for (size_t k = 0; k < kReachCount; ++k) {
+    ProbeErrors& out = all[k];
+    const auto total = [&](auto&& of) {
+      std::vector<double> by_light(lights);
+      for (size_t i = 0; i < count; ++i) {
+        for (size_t l = 0; l < lights; ++l) by_light[l] += of(sums[(i * kReachCount + k) * lights + l]) / static_cast<double>(count);
+      }
+      return relative(by_light, energy_, typical_energy());
+    };
+    const double relight = total([](const Sums& s) { return s.relight2; });
+    for (size_t n = 0; n < kOrders; ++n) {
+      const double error = total([n](const Sums& s) { return s.error2[n]; });
+      out.bandlimit[n] = std::sqrt(std::max(0.0, error * error - relight * relight));
     }
-    return relative(by_light, energy_, typical_energy());
-  };
-  const double relight = total([](const Sums& s) { return s.relight2; });
-  for (size_t n = 0; n < kOrders; ++n) {
-    const double error = total([n](const Sums& s) { return s.error2[n]; });
-    out.bandlimit[n] = std::sqrt(std::max(0.0, error * error - relight * relight));
+    out.unseen = total([](const Sums& s) { return s.unseen2; });
+    out.relight = std::sqrt(static_cast<double>(kRelightRays)) * relight;
+    for (size_t i = 0; i < count; ++i) {
+      for (size_t n = 0; n < 3; ++n) out.near_texels[n] += static_cast<double>(near_texels[i][k][n]) / static_cast<double>(count);
+    }
   }
-  out.unseen = total([](const Sums& s) { return s.unseen2; });
-  out.relight = std::sqrt(static_cast<double>(kRelightRays)) * relight;
-  return out;
+  return all;
 }
 
 }  // namespace lightloom

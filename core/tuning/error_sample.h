@@ -13,12 +13,18 @@
 
 namespace lightloom {
 
-/// In units of rel_rmse; means over the lights.
+/// Near fields that are tried, in units of the plan's, ascending.
+inline constexpr std::array<float, 4> kReaches = {0, 0.5f, 1, 2};
+
+/// With one of them, in units of rel_rmse; means over the lights.
 struct ProbeErrors {
   std::array<double, kMaxShOrder + 1> bandlimit{};  ///< by the order of the probes: few, blurred measurements
   double unseen = 0;                                ///< of it: light from what no probe in reach sees
   double relight = 0;                               ///< of one relight ray: N rays have 1/√N of it
+  std::array<double, 3> near_texels{};              ///< in a receiver's near field, by kNearRays
+  static constexpr int kNearRays[] = {128, 256, 512};
 };
+using ErrorsByReach = std::array<ProbeErrors, kReaches.size()>;
 
 class ErrorSample {
  public:
@@ -27,7 +33,7 @@ class ErrorSample {
                                                              const Parallel& how);
 
   /// REQUIRES: a finished plan on the ground, by the default method. Error: cancellation.
-  absl::StatusOr<ProbeErrors> measure(const Plan& plan, const Parallel& how) const;
+  absl::StatusOr<ErrorsByReach> measure(const Plan& plan, const Parallel& how) const;
 
   const SampleLights& lights() const { return lights_; }
   /// E under each light from near texels, whose rays are a share of `rays`; added to `e`.

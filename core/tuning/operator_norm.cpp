@@ -147,7 +147,7 @@ absl::StatusOr<std::vector<double>> operator_norms(const RayTracer& tracer, cons
   const std::vector<Vec3> positions = positions_of(plan.placement.probes);
   VisibilityCache cache(tracer, plan.layout, plan.receivers.grids, positions);
   const ReceiverSearch surfaces(tracer, plan.layout, plan.receivers);
-  const float near = near_field(plan.params);
+  const float near = plan.params.near_field;
   std::vector<double> norms(receivers.size());
   const bool done = parallel_for(receivers.size(), how, [&](uint64_t i) {
     const CellTask& task = tasks[i];

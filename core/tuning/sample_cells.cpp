@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <set>
 
 #include "core/bake/tasks.h"
 #include "core/base/half.h"
@@ -14,7 +13,6 @@ namespace {
 
 constexpr size_t kShare = 16, kMost = 4;  // of the cells
 constexpr uint32_t kRelightRays = 512;    // it is only asked how E changes
-constexpr double kNearTexelBytes = 6;
 constexpr size_t J = kMaxShCount, kOrders = kMaxShOrder + 1;
 
 absl::Status cancelled() { return absl::CancelledError("cancelled while choosing parameters"); }
@@ -99,7 +97,6 @@ absl::StatusOr<SampleCells> SampleCells::create(const RayTracer& tracer, const P
       m = Matrix::Zero(static_cast<Eigen::Index>(n), static_cast<Eigen::Index>(task.probes.size() * J));
     }
     for (auto& near : cell.near) near.assign(n * lights, 0);
-    for (auto& texels : cell.near_texels) texels.assign(n, 0);
     cell.judged.assign(n * kJudges * lights * kOrders, 0);
     cell.seed = task.seed;
     for (const GatherPoint& r : task.receivers) cell.positions.push_back(r.point.position);
@@ -117,12 +114,11 @@ absl::StatusOr<SampleCells> SampleCells::create(const RayTracer& tracer, const P
     const CellTask& task = tasks[piece.cell];
     Cell& cell = out.cells_[piece.cell];
     Gatherer gatherer(tracer, &cache, &sample.surfaces(), {task.probes, task.probe_ids},
-                      {kMaxShOrder, static_cast<int>(kBatchRays), true, near_field(plan.params)});
+                      {kMaxShOrder, static_cast<int>(kBatchRays), true, plan.params.near_field});
     std::vector<float> row(task.probes.size() * J);
     for (size_t r = piece.first; r < piece.end; ++r) {
       std::vector<float> sum(row.size(), 0.0f);
       std::vector<double> near(lights), near_sum(lights);
-      std::set<uint32_t> near_texels;
       size_t stored = 0;
       for (uint32_t b = 0; b < kBatches + kJudges; ++b) {
         GatherPoint point = task.receivers[r];
@@ -143,12 +139,10 @@ absl::StatusOr<SampleCells> SampleCells::create(const RayTracer& tracer, const P
         }
         for (size_t k = 0; k < sum.size(); ++k) sum[k] += row[k];
         for (size_t l = 0; l < lights; ++l) near_sum[l] += near[l];
-        for (const NearTexel& texel : gatherer.near()) near_texels.insert(texel.receiver);
         if ((b + 1) * kBatchRays == static_cast<uint32_t>(kRays[stored])) {
           auto to = cell.transport[stored].row(static_cast<Eigen::Index>(r));
           to = Eigen::Map<const Eigen::RowVectorXf>(sum.data(), to.cols()) / static_cast<float>(b + 1);
           for (size_t l = 0; l < lights; ++l) cell.near[stored][r * lights + l] = near_sum[l] / (b + 1);
-          cell.near_texels[stored][r] = static_cast<uint32_t>(near_texels.size());
           ++stored;
         }
       }
@@ -161,7 +155,7 @@ absl::StatusOr<SampleCells> SampleCells::create(const RayTracer& tracer, const P
 absl::StatusOr<CompressionCost> SampleCells::compress(const CompressionChoice& choice, const Parallel& how) const {
   struct Sums {
     double error2 = 0, rounding2 = 0, energy2 = 0;  // weighted alike, summed over lights and receivers
-    double bytes = 0, receivers = 0;
+    double projection = 0, other = 0, receivers = 0;
   };
   const size_t of_rays =
       static_cast<size_t>(std::find(std::begin(kRays), std::end(kRays), choice.rays) - std::begin(kRays));
@@ -181,12 +175,11 @@ absl::StatusOr<CompressionCost> SampleCells::compress(const CompressionChoice& c
     const CompressedCell compressed =
         compress_cell(narrowed(cell.transport[of_rays], choice.order), cell.positions, options);
     s.receivers = static_cast<double>(cell.positions.size());
-    s.bytes = s.receivers * sizeof(uint16_t);
-    for (const uint32_t n : cell.near_texels[of_rays]) s.bytes += kNearTexelBytes * n;
+    s.other = s.receivers * sizeof(uint16_t);
     for (const CellChunk::Cluster& cluster : compressed.clusters) {
-      s.bytes += static_cast<double>(cluster.projection.size() + cluster.reconstruction.size()) * sizeof(Half);
-      s.bytes +=
-          static_cast<double>(cluster.correction.size() * sizeof(float) + cluster.probes.size() * sizeof(uint32_t));
+      s.projection += static_cast<double>(cluster.projection.size() * sizeof(Half));
+      s.other += static_cast<double>(cluster.reconstruction.size() * sizeof(Half) +
+                                     cluster.correction.size() * sizeof(float) + cluster.probes.size() * sizeof(uint32_t));
       CellChunk::Cluster coarse = cluster;
       for (Half& h : coarse.projection) h = rounded_further(h);
       for (Half& h : coarse.reconstruction) h = rounded_further(h);
@@ -220,10 +213,10 @@ absl::StatusOr<CompressionCost> SampleCells::compress(const CompressionChoice& c
   Sums all;
   for (const Sums& s : sums) {
     all.error2 += s.error2, all.rounding2 += s.rounding2, all.energy2 += s.energy2;
-    all.bytes += s.bytes, all.receivers += s.receivers;
+    all.projection += s.projection, all.other += s.other, all.receivers += s.receivers;
   }
   CompressionCost out;
-  if (all.receivers > 0) out.bytes_per_receiver = all.bytes / all.receivers;
+  if (all.receivers > 0) out.projection = all.projection / all.receivers, out.other = all.other / all.receivers;
   // Of the energy of the same receivers: few cells know little of the level's.
   if (all.energy2 > 0) {
     out.fp16 = std::sqrt(all.rounding2 / all.energy2);

@@ -18,9 +18,11 @@ struct CompressionChoice {
 
 /// Errors in units of rel_rmse.
 struct CompressionCost {
-  double error = 0;               ///< of noise and truncation, without fp16
-  double fp16 = 0;                ///< what rounding to 16 bits does
-  double bytes_per_receiver = 0;  ///< of cells: matrices, and what is kept of each receiver
+  double error = 0;  ///< of noise and truncation, without fp16
+  double fp16 = 0;   ///< what rounding to 16 bits does
+  // Bytes a receiver, but for its near field:
+  double projection = 0;  ///< matrices with a column for each coefficient of a probe
+  double other = 0;
 };
 
 class SampleCells {
@@ -40,11 +42,10 @@ class SampleCells {
 
   struct Cell {
     std::vector<Vec3> positions;
-    Matrix transport[kRayCounts];                   // of the widest order, by kRays
-    std::vector<double> near[kRayCounts];           // E from near fields: receivers × lights, by kRays
-    std::vector<uint32_t> near_texels[kRayCounts];  // in them: per receiver
-    std::vector<float> judged;                      // E: receivers × judging batches × lights × orders
-    std::vector<std::vector<float>> lambda;         // per light: probes × J of the widest order
+    Matrix transport[kRayCounts];          // of the widest order, by kRays
+    std::vector<double> near[kRayCounts];  // E from near fields: receivers × lights, by kRays
+    std::vector<float> judged;             // E: receivers × judging batches × lights × orders
+    std::vector<std::vector<float>> lambda;  // per light: probes × J of the widest order
     uint64_t seed = 0;
   };
   std::vector<Cell> cells_;

@@ -20,16 +20,17 @@ constexpr uint64_t kMostProbes = 30000;
 constexpr double kBandlimit = 0.82, kRelight = 0.15, kCompression = 0.35;
 // Where it is all that can be had, the rest is to add little to it.
 constexpr double kOfBest = 0.92;
-// The knee: a step that takes k times the probes must take the error down by k^-0.2 at least.
-constexpr double kKnee = 0.2;
-constexpr double kAlmost = 1.04;  // an order whose error is this near to the best one's
+// The knee: k times the bytes are worth k^-(1/3) times the error.
+constexpr double kKnee = 1.0 / 3;
 constexpr int kRelightRays[] = {512, 1024, 2048, 4096, 8192};
-// Thresholds that are tried, times the target: loose ones first.
-constexpr double kThresholds[] = {1.4, 1, 0.7, 0.5, 0.35, 0.25};
+// Thresholds, times the target. Looser ones also lose more of the noise: the middle one is tried first.
+constexpr double kMiddle = 0.5, kTight = 0.25, kLoose[] = {1.4, 1, 0.7};
 constexpr double kFalling = 0.95;
 constexpr int kRanks[] = {32, 64};
-constexpr double kSurfaceBytes = 24,
-                 kProbeBytes = 200;  // beside the cells: per receiver, and per probe besides its rays
+constexpr double kSurfaceBytes = 24, kNearTexelBytes = 6;  // per receiver
+constexpr double kProbeBytes = 200;                         // besides its rays
+constexpr int kTypicalOrder = 6;  // with which compression is tried before the order is known
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 float spacing_of(float base, int step) {
   // Products of exact halves and one rounded root: the same everywhere.
@@ -49,24 +50,40 @@ int fewest(const int (&counts)[N], double of_one, double most) {
 /// A spacing that was tried.
 struct Trial {
   Plan plan;
-  ProbeErrors errors;
+  ErrorsByReach errors;
 
-  double best() const { return *std::min_element(errors.bandlimit.begin() + 1, errors.bandlimit.end()); }
-  uint64_t probes() const { return plan.placement.probes.size(); }
-  /// The lowest order that errs no more than `most`; 0: none.
-  int order(double most) const {
-    for (int n = 1; n <= kMaxShOrder; ++n) {
-      if (errors.bandlimit[static_cast<size_t>(n)] <= most) return n;
+  double bandlimit(size_t reach, int order) const { return errors[reach].bandlimit[static_cast<size_t>(order)]; }
+  double best() const {
+    double least = std::numeric_limits<double>::infinity();
+    for (const ProbeErrors& e : errors) {
+      least = std::min(least, *std::min_element(e.bandlimit.begin() + 1, e.bandlimit.end()));
     }
-    return 0;
+    return least;
   }
+  uint64_t probes() const { return plan.placement.probes.size(); }
+};
+
+/// A spacing, a near field and an order; of `error` all that is left to choose is to take its share.
+struct Choice {
+  int step = 0;
+  size_t reach = 0;
+  int order = 0;
+  double error = 0;
+};
+
+struct Compressed {
+  CompressionChoice choice;
+  CompressionCost cost;
+  double truncation = 0;
 };
 
 class Tuner {
  public:
   Tuner(const RayTracer& tracer, const BakeControl& control) : tracer_(tracer), control_(control) {}
 
-  absl::Status prepare(const BakeParams& request) {
+  absl::Status prepare(BakeParams request) {
+    request.spacing = 0;
+    request.near_field = BakeParams::kFollows;
     LL_ASSIGN_OR_RETURN(ground_, find_ground(tracer_, request, control_));
     base_ = ground_.params.spacing;
     LL_ASSIGN_OR_RETURN(sample_, ErrorSample::create(tracer_, ground_, control_.stage("parameters: truth")));
@@ -75,80 +92,133 @@ class Tuner {
 
   /// The knee if no model errs as little as `error`.
   absl::StatusOr<Tuning> for_error(double error) {
-    const double most = kBandlimit * error;
-    Tuning out;
     int step = 0;
-    LL_ASSIGN_OR_RETURN(const Trial* at, trial(step));
-    while (at->best() > most) {
-      if (!can_go(step + 1)) return at_knee(step);
-      LL_ASSIGN_OR_RETURN(const Trial* finer, trial(step + 1));
-      if (is_knee(*at, *finer)) return at_knee(step);
-      at = finer;
-      ++step;
+    for (;; ++step) {
+      LL_ASSIGN_OR_RETURN(const Trial* at, trial(step));
+      if (at->best() <= kBandlimit * error) break;
+      LL_ASSIGN_OR_RETURN(const double here, merit(step));
+      LL_ASSIGN_OR_RETURN(const double finer, merit(step + 1));
+      if (finer >= here) return finish_best(step, &Tuner::knee);
     }
-    // Coarser with higher orders, or finer with lower ones, as long as that is smaller.
-    LL_ASSIGN_OR_RETURN(out.chosen, model(step, at->order(most), error));
-    const int start = step;
-    for (const int direction : {-1, 1}) {
-      if (direction == 1 && step < start) break;
-      for (int s = start + direction; s >= kCoarsest && can_go(s); s += direction) {
-        LL_ASSIGN_OR_RETURN(const Trial* other, trial(s));
-        const int order = other->order(most);
-        if (order == 0) break;
-        LL_ASSIGN_OR_RETURN(const TunedModel candidate, model(s, order, error));
-        if (candidate.bytes >= out.chosen.bytes) break;
-        out.chosen = candidate;
-        step = s;
-      }
-    }
+    target_ = error;
+    LL_ASSIGN_OR_RETURN(Tuning out, finish_best(step, &Tuner::smallest));
     out.met = out.chosen.parts.total() <= error;
-    LL_RETURN_IF_ERROR(look_ahead(step, &out));
     return out;
   }
 
   absl::StatusOr<Tuning> for_bytes(uint64_t bytes) {
-    Tuning out;
-    double least = 0;
-    int step = kCoarsest;
-    bool any = false;
-    for (int s = kCoarsest; can_go(s); ++s) {
-      LL_ASSIGN_OR_RETURN(const Trial* at, trial(s));
+    const auto most = static_cast<double>(bytes);
+    std::vector<std::pair<double, Choice>> fitting;  // by total error
+    double least = kInfinity, best = kInfinity;
+    for (int step = kCoarsest; can_go(step); ++step) {
+      LL_ASSIGN_OR_RETURN(const Trial* at, trial(step));
       bool fits = false;
-      for (int order = 1; order <= kMaxShOrder; ++order) {
-        const double error = at->errors.bandlimit[static_cast<size_t>(order)] / kOfBest;
-        if (any && error > 1.02 * out.chosen.parts.total()) continue;  // no better, whatever it takes
-        LL_ASSIGN_OR_RETURN(const TunedModel candidate, model(s, order, error));
-        least = least > 0 ? std::min(least, candidate.bytes) : candidate.bytes;
-        if (candidate.bytes > static_cast<double>(bytes)) break;  // higher orders take more
-        fits = true;
-        if (!any || candidate.parts.total() < out.chosen.parts.total()) out.chosen = candidate, step = s;
-        any = true;
+      for (size_t reach = 0; reach < kReaches.size(); ++reach) {
+        for (int order = 1; order <= kMaxShOrder; ++order) {
+          const Choice choice{step, reach, order, at->bandlimit(reach, order) / kOfBest};
+          if (choice.error > 1.02 * best) continue;  // no better, whatever it takes
+          LL_ASSIGN_OR_RETURN(const TunedModel m, estimate(choice));
+          least = std::min(least, m.bytes);
+          if (m.bytes > most) break;  // higher orders take more
+          fits = true;
+          best = std::min(best, m.parts.total());
+          fitting.emplace_back(m.parts.total(), choice);
+        }
       }
-      if (!fits && s > step + 1) break;  // finer ones take more
+      if (!fits && !fitting.empty() && step > fitting.back().second.step + 1) break;  // finer ones take more
     }
-    if (!any) {
-      return absl::InvalidArgumentError("--budget is too small: the least model of this level takes about " +
-                                        std::to_string(static_cast<uint64_t>(least)) +
-                                        " bytes; give more, or a coarser lightmap by --texels-per-metre");
+    std::stable_sort(fitting.begin(), fitting.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+    for (const auto& [total, choice] : fitting) {
+      LL_ASSIGN_OR_RETURN(Tuning out, finish(choice));
+      if (out.chosen.bytes > most) continue;
+      out.met = true;
+      return out;
     }
-    out.met = true;
-    LL_RETURN_IF_ERROR(look_ahead(step, &out));
-    return out;
+    return absl::InvalidArgumentError("--budget is too small: the least model of this level takes about " +
+                                      std::to_string(static_cast<uint64_t>(least)) +
+                                      " bytes; give more, or a coarser lightmap by --texels-per-metre");
   }
 
   int plans() const { return static_cast<int>(trials_.size()); }
 
  private:
+  /// What is best of one spacing, and how good that is: less is better, infinity is none.
+  struct Found {
+    double merit = kInfinity;
+    Choice choice;
+  };
+
+  /// The fewest bytes for target_.
+  absl::StatusOr<Found> smallest(int step) {
+    LL_ASSIGN_OR_RETURN(const Trial* at, trial(step));
+    Found out;
+    for (size_t reach = 0; reach < kReaches.size(); ++reach) {
+      int order = 1;
+      while (order <= kMaxShOrder && at->bandlimit(reach, order) > kBandlimit * target_) ++order;
+      if (order > kMaxShOrder) continue;
+      const Choice choice{step, reach, order, target_};
+      LL_ASSIGN_OR_RETURN(const TunedModel m, estimate(choice));
+      if (m.bytes < out.merit) out = {m.bytes, choice};
+    }
+    return out;
+  }
+
+  /// The best trade.
+  absl::StatusOr<Found> knee(int step) {
+    LL_ASSIGN_OR_RETURN(const Trial* at, trial(step));
+    constexpr double kWorthwhile = 1.5;  // errors above so much of the best one are not looked at
+    Found out;
+    for (size_t reach = 0; reach < kReaches.size(); ++reach) {
+      for (int order = 1; order <= kMaxShOrder; ++order) {
+        const double bandlimit = at->bandlimit(reach, order);
+        if (bandlimit > kWorthwhile * at->best()) continue;
+        const Choice choice{step, reach, order, bandlimit / kOfBest};
+        LL_ASSIGN_OR_RETURN(const TunedModel m, estimate(choice));
+        const double merit = m.parts.total() * std::pow(m.bytes, kKnee);
+        if (merit < out.merit) out = {merit, choice};
+      }
+    }
+    return out;
+  }
+
+  /// knee()'s, by its merit alone; infinity for a spacing that is not tried.
+  absl::StatusOr<double> merit(int step) {
+    if (!can_go(step)) return kInfinity;
+    LL_ASSIGN_OR_RETURN(const Found found, knee(step));
+    return found.merit;
+  }
+
+  /// Coarser spacings with higher orders, or finer ones with lower, as long as that is better.
+  absl::StatusOr<Tuning> finish_best(int start, absl::StatusOr<Found> (Tuner::*best_of)(int)) {
+    LL_ASSIGN_OR_RETURN(Found best, (this->*best_of)(start));
+    for (const int direction : {-1, 1}) {
+      if (direction == 1 && best.choice.step < start) break;
+      for (int step = start + direction; can_go(step); step += direction) {
+        LL_ASSIGN_OR_RETURN(const Found other, (this->*best_of)(step));
+        if (other.merit >= best.merit) break;
+        best = other;
+      }
+    }
+    return finish(best.choice);
+  }
+
+  absl::StatusOr<Tuning> finish(const Choice& choice) {
+    Tuning out;
+    LL_ASSIGN_OR_RETURN(out.chosen, model(choice));
+    Choice next = choice;
+    ++next.step;
+    if (!can_go(next.step)) return out;
+    LL_ASSIGN_OR_RETURN(const Trial* finer, trial(next.step));
+    next.error = finer->bandlimit(next.reach, next.order) / kOfBest;
+    LL_ASSIGN_OR_RETURN(out.next, estimate(next));
+    return out;
+  }
+
   /// Finer than that is not tried: there would be too many probes, judging by the step before.
   bool can_go(int step) const {
     if (step < kCoarsest || step > kFinest) return false;
     const auto before = trials_.find(step - 1);
     return before == trials_.end() || 2 * before->second.probes() <= kMostProbes;
-  }
-
-  bool is_knee(const Trial& at, const Trial& finer) const {
-    const double dearer = static_cast<double>(finer.probes()) / static_cast<double>(std::max<uint64_t>(1, at.probes()));
-    return finer.best() > at.best() * std::pow(std::max(1.0, dearer), -kKnee);
   }
 
   absl::StatusOr<const Trial*> trial(int step) {
@@ -162,99 +232,119 @@ class Tuner {
     return &trials_.emplace(step, std::move(t)).first->second;
   }
 
-  /// All else for a spacing and an order, so that no part of the error exceeds its share of `error`.
-  absl::StatusOr<TunedModel> model(int step, int order, double error) {
-    LL_ASSIGN_OR_RETURN(const Trial* at, trial(step));
+  /// All else for a choice, so that no part of the error exceeds its share.
+  absl::StatusOr<TunedModel> model(const Choice& choice) {
+    LL_ASSIGN_OR_RETURN(const Compressed c, compressed(choice.step, choice.order, choice.error));
+    return model(choice, c);
+  }
+
+  /// The same, roughly: compression as it is for a typical order, and about so large an error.
+  absl::StatusOr<TunedModel> estimate(const Choice& choice) {
+    double error = 1;
+    while (error > choice.error && error > 1e-3) error /= 1.41421356;
+    const auto key = std::pair(choice.step, error);
+    if (!typical_.contains(key)) {
+      LL_ASSIGN_OR_RETURN(const Compressed c, compressed(choice.step, kTypicalOrder, error));
+      typical_.emplace(key, c);
+    }
+    Compressed c = typical_.at(key);
+    c.cost.projection *= static_cast<double>(sh_count(choice.order)) / sh_count(kTypicalOrder);
+    return model(choice, c);
+  }
+
+  absl::StatusOr<TunedModel> model(const Choice& choice, const Compressed& c) {
+    LL_ASSIGN_OR_RETURN(const Trial* at, trial(choice.step));
+    const ProbeErrors& errors = at->errors[choice.reach];
     TunedModel out;
     out.params = at->plan.params;
-    out.params.order = order;
+    out.params.near_field *= kReaches[choice.reach];
+    out.params.order = choice.order;
     // Fewer rays than coefficients cannot tell them apart.
-    out.params.relight_rays = std::max(fewest(kRelightRays, at->errors.relight, kRelight * error), 8 * sh_count(order));
+    out.params.relight_rays =
+        std::max(fewest(kRelightRays, errors.relight, kRelight * choice.error), 8 * sh_count(choice.order));
+    out.params.rays = c.choice.rays;
+    out.params.max_rank = c.choice.max_rank;
+    out.params.threshold = c.choice.threshold;
     out.probes = at->probes();
-    out.parts.bandlimit = at->errors.bandlimit[static_cast<size_t>(order)];
-    out.parts.unseen = at->errors.unseen;
-    out.parts.relight = at->errors.relight / std::sqrt(static_cast<double>(out.params.relight_rays));
-
-    LL_ASSIGN_OR_RETURN(const CompressionCost cost, choose_compression(step, kCompression * error, error, &out.params));
-    out.parts.fp16 = cost.fp16;
-    // With as many rays as were gathered, what is left is what the rank cuts off.
-    CompressionChoice quiet = choice_of(out.params);
-    quiet.rays = *std::rbegin(SampleCells::kRays);
-    CompressionCost truncation = cost;
-    if (quiet.rays != out.params.rays) {
-      LL_ASSIGN_OR_RETURN(truncation, cells_.at(step).compress(quiet, control_.stage("parameters: rank")));
-    }
-    out.parts.truncation = std::min(truncation.error, cost.error);
-    out.parts.noise = std::sqrt(cost.error * cost.error - out.parts.truncation * out.parts.truncation);
-    const double receivers = static_cast<double>(at->plan.receivers.all.size());
-    out.bytes = receivers * (cost.bytes_per_receiver + kSurfaceBytes) +
+    out.parts.bandlimit = at->bandlimit(choice.reach, choice.order);
+    out.parts.unseen = errors.unseen;
+    out.parts.relight = errors.relight / std::sqrt(static_cast<double>(out.params.relight_rays));
+    out.parts.fp16 = c.cost.fp16;
+    out.parts.truncation = c.truncation;
+    out.parts.noise = std::sqrt(c.cost.error * c.cost.error - c.truncation * c.truncation);
+    const auto& counts = ProbeErrors::kNearRays;
+    const auto rays = std::lower_bound(std::begin(counts), std::end(counts) - 1, c.choice.rays);
+    const double near_texels = errors.near_texels[static_cast<size_t>(rays - std::begin(counts))];
+    out.bytes = static_cast<double>(at->plan.receivers.all.size()) *
+                    (c.cost.projection + c.cost.other + kSurfaceBytes + kNearTexelBytes * near_texels) +
                 static_cast<double>(out.probes) * (4.0 * out.params.relight_rays + kProbeBytes);
     return out;
   }
 
-  static CompressionChoice choice_of(const BakeParams& p) {
-    return {p.order, p.rays, p.relight_rays, p.max_rank, p.threshold};
-  }
-
-  /// The fewest rays, then the loosest threshold, whose noise and truncation together stay below `most`; the best there is if
-  /// none do.
-  absl::StatusOr<CompressionCost> choose_compression(int step, double most, double error, BakeParams* params) {
+  /// The lowest rank, the fewest rays and the loosest threshold whose noise and truncation together stay below their share of
+  /// `error`; the best there is if none do. The near field hardly matters, and is the plan's.
+  absl::StatusOr<Compressed> compressed(int step, int order, double error) {
     const Parallel how = control_.stage("parameters: rank");
+    LL_RETURN_IF_ERROR(trial(step).status());
     if (!cells_.contains(step)) {
-      LL_ASSIGN_OR_RETURN(SampleCells cells, SampleCells::create(tracer_, trials_.at(step).plan, *sample_, how));
-      cells_.emplace(step, std::move(cells));
+      LL_ASSIGN_OR_RETURN(SampleCells made, SampleCells::create(tracer_, trials_.at(step).plan, *sample_, how));
+      cells_.emplace(step, std::move(made));
     }
-    std::optional<std::pair<CompressionCost, CompressionChoice>> best;
-    const auto enough = [&] { return best && best->first.error <= most; };
+    const SampleCells& cells = cells_.at(step);
+    Compressed best;
+    best.cost.error = kInfinity;
+    const auto enough = [&] { return best.cost.error <= kCompression * error; };
+    /// Whether it is better, or enough.
+    const auto attempt = [&](CompressionChoice choice, double threshold) -> absl::StatusOr<bool> {
+      choice.threshold = static_cast<float>(std::clamp(threshold * error, 0.002, 0.5));
+      LL_ASSIGN_OR_RETURN(const CompressionCost cost, cells.compress(choice, how));
+      if (cost.error > kCompression * error && !(cost.error < kFalling * best.cost.error)) return false;
+      best.choice = choice;
+      best.cost = cost;
+      return true;
+    };
+    CompressionChoice choice;
+    choice.order = order;
     for (const int rank : kRanks) {
+      choice.max_rank = rank;
       for (const int rays : SampleCells::kRays) {
-        double before = std::numeric_limits<double>::infinity();
-        for (const double threshold : kThresholds) {
-          CompressionChoice choice = choice_of(*params);
-          choice.rays = rays;
-          choice.max_rank = rank;
-          choice.threshold = static_cast<float>(std::clamp(threshold * error, 0.002, 0.5));
-          LL_ASSIGN_OR_RETURN(const CompressionCost cost, cells_.at(step).compress(choice, how));
-          if (!best || cost.error < best->first.error) best = {cost, choice};
-          // Once it falls no more, what is left is noise: only more rays help.
-          if (enough() || cost.error > kFalling * before) break;
-          before = cost.error;
-        }
-        if (enough()) break;
+        if (rays < best.choice.rays && rank > kRanks[0]) continue;
+        choice.rays = rays;
+        LL_ASSIGN_OR_RETURN(const bool better, attempt(choice, kMiddle));
+        if (enough() || !better) break;
       }
       if (enough()) break;
+      LL_RETURN_IF_ERROR(attempt(best.choice, kTight).status());
+      if (enough()) break;
     }
-    params->rays = best->second.rays;
-    params->max_rank = best->second.max_rank;
-    params->threshold = best->second.threshold;
-    return best->first;
-  }
-
-  absl::StatusOr<Tuning> at_knee(int step) {
-    LL_ASSIGN_OR_RETURN(const Trial* at, trial(step));
-    const int order = at->order(kAlmost * at->best());
-    Tuning out;
-    LL_ASSIGN_OR_RETURN(out.chosen, model(step, order, at->errors.bandlimit[static_cast<size_t>(order)] / kOfBest));
-    LL_RETURN_IF_ERROR(look_ahead(step, &out));
-    return out;
-  }
-
-  absl::Status look_ahead(int step, Tuning* out) {
-    if (!can_go(step + 1)) return absl::OkStatus();
-    LL_ASSIGN_OR_RETURN(const Trial* finer, trial(step + 1));
-    const int order = out->chosen.params.order;
-    LL_ASSIGN_OR_RETURN(out->next,
-                        model(step + 1, order, finer->errors.bandlimit[static_cast<size_t>(order)] / kOfBest));
-    return absl::OkStatus();
+    if (enough() && best.choice.threshold >= static_cast<float>(kMiddle * error)) {
+      for (const double threshold : kLoose) {
+        const Compressed before = best;
+        LL_RETURN_IF_ERROR(attempt(best.choice, threshold).status());
+        if (enough() && best.choice.threshold > before.choice.threshold) break;
+        best = before;
+      }
+    }
+    // With as many rays as were gathered, what is left is what the rank cuts off.
+    CompressionChoice quiet = best.choice;
+    quiet.rays = *std::rbegin(SampleCells::kRays);
+    CompressionCost truncation = best.cost;
+    if (quiet.rays != best.choice.rays) {
+      LL_ASSIGN_OR_RETURN(truncation, cells.compress(quiet, how));
+    }
+    best.truncation = std::min(truncation.error, best.cost.error);
+    return best;
   }
 
   const RayTracer& tracer_;
   const BakeControl& control_;
   Plan ground_;
   float base_ = 1;
+  double target_ = 0;
   std::unique_ptr<ErrorSample> sample_;
   std::map<int, Trial> trials_;
   std::map<int, SampleCells> cells_;
+  std::map<std::pair<int, double>, Compressed> typical_;  // by step and error
 };
 
 }  // namespace

@@ -1,5 +1,5 @@
-// The cheapest model of a level that is accurate enough, or the most accurate one that is small enough: spacing, order, rays and
-// rank follow from measured parts of the error, so that none of them is finer than the others let it show.
+// The cheapest model of a level that is accurate enough, or the most accurate one that is small enough: spacing, near field, order,
+// rays and rank follow from measured parts of the error, so that none of them is finer than the others let it show.
 #pragma once
 
 #include <optional>
@@ -11,7 +11,7 @@
 namespace lightloom {
 
 /// Changes with any change of what is chosen. Choices that are on record hold without it; what is remembered of the tuner's does not.
-inline constexpr std::string_view kTunerVersion = "2";
+inline constexpr std::string_view kTunerVersion = "3";
 
 /// One of them is set.
 struct TuneTarget {

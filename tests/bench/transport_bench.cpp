@@ -61,7 +61,7 @@ int run(int argc, char** argv) {
     const CellTask task = make_cell_task(plan, scene, plan.cells[i]);
     const bench::GatheredCell cell =
         bench::gather_cell(*tracer, cached ? &cache : nullptr, surfaces, task,
-                           {params.order, plan.params.rays, !sl17, near_field(plan.params)});
+                           {params.order, plan.params.rays, !sl17, plan.params.near_field});
     stats[i] = cell.stats;
     trace_bytes += cell.trace_bytes;
   });

@@ -48,7 +48,7 @@ void gather(benchmark::State& state) {
           },
           [&] {
             gather_cell(*level.tracer, &cache, level.surfaces, cell,
-                        {params.order, params.rays, true, near_field(params)});
+                        {params.order, params.rays, true, params.near_field});
           });
     }
   }

@@ -140,6 +140,8 @@ TEST(Manifest, FieldsOutOfRangeAreRejected) {
       {"spacing", [](Manifest& m) { m.params.spacing = 0; }},
       {"spacing", [](Manifest& m) { m.params.spacing = kNan; }},
       {"spacing", [](Manifest& m) { m.params.spacing = kInf; }},
+      {"near field", [](Manifest& m) { m.params.near_field = -1; }},
+      {"near field", [](Manifest& m) { m.params.near_field = kNan; }},
       {"links", [](Manifest& m) { m.params.links = 0; }},
       {"rays", [](Manifest& m) { m.params.rays = 0; }},
       {"relight rays", [](Manifest& m) { m.params.relight_rays = 0; }},

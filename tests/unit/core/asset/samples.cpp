@@ -87,6 +87,7 @@ Manifest sample_manifest() {
   m.scene_hash = digest_of(0x33);
   m.params.order = 1;
   m.params.spacing = 2.5f;
+  m.params.near_field = 0.625f;
   m.params.links = 3;
   m.params.rays = 64;
   m.params.relight_rays = 8;

@@ -194,6 +194,12 @@ TEST(Bake, RefusesWhatItCannotBake) {
   bad.spacing = -1;
   EXPECT_THAT(error(test::room_with_crate(), bad), HasSubstr("--spacing"));
   bad = small();
+  bad.near_field = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_THAT(error(test::room_with_crate(), bad), HasSubstr("--near-field"));
+  bad = sl17_params();
+  bad.near_field = 1;
+  EXPECT_THAT(error(test::room_with_crate(), bad), HasSubstr("sl17"));
+  bad = small();
   bad.rays = 0;
   EXPECT_THAT(error(test::room_with_crate(), bad), HasSubstr("--rays"));
   Scene none = test::room_with_crate();
