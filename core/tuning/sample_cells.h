@@ -32,13 +32,13 @@ class SampleCells {
   static absl::StatusOr<SampleCells> create(const RayTracer& tracer, const Plan& plan, const ErrorSample& sample,
                                             const Parallel& how);
 
-  static constexpr int kRays[] = {64, 128, 256, 512};  ///< that can be asked for
+  static constexpr int kRays[] = {64, 128, 256, 512, 1024};  ///< that can be asked for
   /// Error: cancellation.
   absl::StatusOr<CompressionCost> compress(const CompressionChoice& choice, const Parallel& how) const;
 
  private:
   static constexpr size_t kRayCounts = std::size(kRays);
-  static constexpr uint32_t kBatchRays = 64, kBatches = 8, kJudges = 4;  ///< batches that judge those
+  static constexpr uint32_t kBatchRays = 64, kBatches = 16, kJudges = 4;  ///< batches that judge those
 
   struct Cell {
     std::vector<Vec3> positions;
