@@ -10,28 +10,29 @@ constexpr float kDefaultError = 0.05f;
 }  // namespace
 
 std::vector<Option> BakeOptions::options() {
-  return {{"--error",
-           "choose the cheapest model by its estimated relative error (RMS, one bounce), in place of the options from "
-           "--spacing to --threshold",
-           &error_},
-          {"--budget", "choose the most accurate model of about so many bytes at most, like 32MB; 0: no budget",
-           SizeOption{&budget_}},
-          {"--retune", "choose anew for --error [0.05] or --budget, whatever the parameters of OUT.loom are", &retune_},
-          {"--method", "default, or sl17: Silvennoinen & Lehtinen 2017 as published, to compare with", &method_},
-          {"--spacing", "side of a probe cell, metres [0: chosen from the level]", &spacing_},
-          {"--near-field", "metres within which a receiver reads texels instead of probes; 0: none [half of the spacing]",
-           &near_field_},
-          {"--order", "spherical harmonics order of the probes, 0 to 9 [7]", &order_},
-          {"--probes", "sl17: how many, instead of by --spacing [0: by --spacing]", &probes_},
-          {"--links", "probes that each receiver reads [6; sl17: 10 on average]", &links_},
-          {"--rays", "gather rays per receiver, rounded up to a × b with a ≤ b ≤ 2a [256]", &rays_},
-          {"--relight-rays", "rays of each probe at run time [4096; sl17: 8000]", &relight_rays_},
-          {"--max-rank", "most coefficients of a cluster [32]", &max_rank_},
-          {"--threshold", "relative error at which a cluster's rank ends [0.02; sl17: 0.005]", &threshold_},
-          {"--cell-receivers", "a bake cell holds fewer receivers than this [1024]", &cell_receivers_},
-          {"--texels-per-metre", "lightmap density [0: chosen from the level]", &texels_per_metre_},
-          {"--lightmap-size", "side of the scene atlas, texels [0: from the density]", &lightmap_size_},
-          {"--seed", "of all random numbers [0]", &seed_}};
+  return {
+      {"--error",
+       "choose the cheapest model by its estimated relative error (RMS, one bounce), in place of the options from "
+       "--spacing to --threshold",
+       &error_},
+      {"--budget", "choose the most accurate model of about so many bytes at most, like 32MB; 0: no budget",
+       SizeOption{&budget_}},
+      {"--retune", "choose anew for --error [0.05] or --budget, whatever the parameters of OUT.loom are", &retune_},
+      {"--method", "default, or sl17: Silvennoinen & Lehtinen 2017 as published, to compare with", &method_},
+      {"--spacing", "side of a probe cell, metres [0: chosen from the level]", &spacing_},
+      {"--near-field", "metres within which a receiver reads texels instead of probes; 0: none [half of the spacing]",
+       &near_field_},
+      {"--order", "spherical harmonics order of the probes, 0 to 9 [7]", &order_},
+      {"--probes", "sl17: how many, instead of by --spacing [0: by --spacing]", &probes_},
+      {"--links", "probes that each receiver reads [6; sl17: 10 on average]", &links_},
+      {"--rays", "gather rays per receiver, rounded up to a × b with a ≤ b ≤ 2a [256]", &rays_},
+      {"--relight-rays", "rays of each probe at run time [4096; sl17: 8000]", &relight_rays_},
+      {"--max-rank", "most coefficients of a cluster [32]", &max_rank_},
+      {"--threshold", "relative error at which a cluster's rank ends [0.02; sl17: 0.005]", &threshold_},
+      {"--cell-receivers", "a bake cell holds fewer receivers than this [1024]", &cell_receivers_},
+      {"--texels-per-metre", "lightmap density [0: chosen from the level]", &texels_per_metre_},
+      {"--lightmap-size", "side of the scene atlas, texels [0: from the density]", &lightmap_size_},
+      {"--seed", "of all random numbers [0]", &seed_}};
 }
 
 std::string BakeOptions::fixed() const {

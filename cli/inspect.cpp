@@ -157,7 +157,8 @@ void print(const Options& o, const Manifest& m, const Summary& s) {
   }
   std::printf("  probes    %zu of order %d, spacing %.3g m, %d relight rays each\n", m.probes.size(), m.params.order,
               static_cast<double>(m.params.spacing), m.params.relight_rays);
-  std::printf("  near      within %.3g m receivers read texels, not probes\n", static_cast<double>(m.params.near_field));
+  std::printf("  near      within %.3g m receivers read texels, not probes\n",
+              static_cast<double>(m.params.near_field));
   std::printf("  receivers %llu in %zu cells, %zu clusters\n", static_cast<unsigned long long>(s.receivers),
               m.cells.size(), m.clusters.size());
   std::printf("  rank      %.1f coefficients a receiver (most %u), %.1f probes a cluster\n", s.coefficients, s.max_rank,

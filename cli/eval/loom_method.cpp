@@ -229,7 +229,8 @@ class TunedMethod : public Method {
     control.threads = level->threads();
     control.cancel = &interrupted();
     const double before = processor_seconds();
-    LL_ASSIGN_OR_RETURN(const Tuning tuning, tune(level->tracer(), level->plan().params, {settings.at("error"), 0}, control));
+    LL_ASSIGN_OR_RETURN(const Tuning tuning,
+                        tune(level->tracer(), level->plan().params, {settings.at("error"), 0}, control));
     return LoomModel::create(level, tuning.chosen.params, scratch / "level.loom", tuning.seconds,
                              processor_seconds() - before);
   }

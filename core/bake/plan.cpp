@@ -145,6 +145,7 @@ absl::StatusOr<Plan> find_ground(const RayTracer& tracer, const BakeParams& requ
   const Scene& scene = tracer.scene();
   Plan plan;
   plan.params = request;
+  plan.params.reserved = 0;
 
   // Choose what the request leaves open, and record it.
   plan.params.rays = static_cast<int32_t>(well_stratified(static_cast<uint32_t>(request.rays)));

@@ -118,8 +118,7 @@ bool Gatherer::sees(uint32_t probe, const Sample& s, Vec3* psi) {
   *psi = sky ? s.direction : normalize(s.position - p);
   if (verdict == VisibilityCache::kSeen) return true;
   ++stats_.visibility_rays;
-  return sky ? !tracer_.occluded(p, s.direction, kInfinity)
-             : tracer_.visible(s.position, p);
+  return sky ? !tracer_.occluded(p, s.direction, kInfinity) : tracer_.visible(s.position, p);
 }
 
 GatherStats Gatherer::add_row(const GatherPoint& receiver, std::span<float> row) {

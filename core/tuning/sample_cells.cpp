@@ -178,8 +178,9 @@ absl::StatusOr<CompressionCost> SampleCells::compress(const CompressionChoice& c
     s.other = s.receivers * sizeof(uint16_t);
     for (const CellChunk::Cluster& cluster : compressed.clusters) {
       s.projection += static_cast<double>(cluster.projection.size() * sizeof(Half));
-      s.other += static_cast<double>(cluster.reconstruction.size() * sizeof(Half) +
-                                     cluster.correction.size() * sizeof(float) + cluster.probes.size() * sizeof(uint32_t));
+      s.other +=
+          static_cast<double>(cluster.reconstruction.size() * sizeof(Half) + cluster.correction.size() * sizeof(float) +
+                              cluster.probes.size() * sizeof(uint32_t));
       CellChunk::Cluster coarse = cluster;
       for (Half& h : coarse.projection) h = rounded_further(h);
       for (Half& h : coarse.reconstruction) h = rounded_further(h);

@@ -42,9 +42,9 @@ class SampleCells {
 
   struct Cell {
     std::vector<Vec3> positions;
-    Matrix transport[kRayCounts];          // of the widest order, by kRays
-    std::vector<double> near[kRayCounts];  // E from near fields: receivers × lights, by kRays
-    std::vector<float> judged;             // E: receivers × judging batches × lights × orders
+    Matrix transport[kRayCounts];            // of the widest order, by kRays
+    std::vector<double> near[kRayCounts];    // E from near fields: receivers × lights, by kRays
+    std::vector<float> judged;               // E: receivers × judging batches × lights × orders
     std::vector<std::vector<float>> lambda;  // per light: probes × J of the widest order
     uint64_t seed = 0;
   };

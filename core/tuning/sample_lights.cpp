@@ -8,6 +8,7 @@
 #include "core/base/sampling.h"
 #include "core/base/sh.h"
 #include "core/receivers/texel_opening.h"
+#include "core/tuning/receiver_sample.h"
 
 namespace lightloom {
 namespace {
@@ -19,6 +20,11 @@ constexpr float kClear = 0.2f;       // of the default spacing: far enough
 constexpr float kEnclosed = 0.4f;    // share of them that must hit something
 constexpr size_t kPoints = 4;        // of a texel, that its radiance is the mean of, at most
 constexpr float kSpotAngle = 0.5f;   // radians from the axis
+// A light of less than this share of the middle one's energy (of what is reflected to receivers) is replaced, if substitutes
+// have more: most of its light leaves the level, or stays in a corner.
+constexpr double kWasted = 0.1;
+constexpr size_t kLookingReceivers = 1024;  // that tell
+constexpr uint32_t kLooks = 8;              // rays of each
 
 /// How good a place is for a lamp: distance to the nearest surface, `enough` at most; below 0 where most of what is around is
 /// void, like outside a house whose rooms are the level.
@@ -59,13 +65,14 @@ enum class Kind { kOpen, kClose, kSpot, kSun };
 constexpr Kind kKinds[] = {Kind::kOpen, Kind::kClose, Kind::kOpen, Kind::kSpot,
                            Kind::kOpen, Kind::kClose, Kind::kOpen, Kind::kSun};
 
-Light light_at(const RayTracer& tracer, const Plan& ground, size_t index, size_t count) {
+/// In its part of the level, at first; other attempts are made anywhere.
+Light light_at(const RayTracer& tracer, const Plan& ground, size_t index, size_t count, uint64_t attempt) {
   const uint64_t n = ground.receivers.all.size();
-  const uint32_t first = static_cast<uint32_t>(index * n / count);
-  const uint32_t end = std::max(first + 1, static_cast<uint32_t>((index + 1) * n / count));
+  const uint32_t first = attempt > 0 ? 0 : static_cast<uint32_t>(index * n / count);
+  const uint32_t end = std::max(first + 1, static_cast<uint32_t>(attempt > 0 ? n : (index + 1) * n / count));
   const float spacing = default_spacing(tracer.scene().bounds()), enough = kClear * spacing;
   const Kind kind = kKinds[index % std::size(kKinds)];
-  Rng rng(hash_combine(kSeed, index));
+  Rng rng(hash_combine(kSeed + attempt, index));
   Light light;
   if (kind == Kind::kSun) {
     light.direction = -to_sky(tracer, ground, first, end, &rng);
@@ -92,6 +99,7 @@ Light light_at(const RayTracer& tracer, const Plan& ground, size_t index, size_t
     light.direction = square_to_sphere(u, v);
     light.inner_cone_angle = 0.6f * kSpotAngle;
     light.outer_cone_angle = kSpotAngle;
+    light.intensity = 2 / (1 - std::cos(kSpotAngle));  // as much light as the others
   }
   return light;
 }
@@ -101,6 +109,26 @@ float irradiance(const RayTracer& tracer, const Light& light, const ShadingPoint
   const float cosine = dot(p.normal, in.to_light);
   if (!(cosine > 0) || dot(p.geometric, in.to_light) <= 0 || in.irradiance == Vec3{}) return 0;
   return tracer.occluded(p.position, in.to_light, in.distance) ? 0 : in.irradiance.x * cosine;
+}
+
+/// What it reflects to a few receivers, squared: a rough idea of its energy.
+double energy(const RayTracer& tracer, const Plan& ground, std::span<const uint32_t> receivers, const Light& light) {
+  double sum = 0;
+  for (const uint32_t r : receivers) {
+    const ShadingPoint& from = ground.receivers.all[r].point;
+    Rng rng(hash_combine(kSeed, r));
+    double of_receiver = 0;
+    for (uint32_t k = 0; k < kLooks; ++k) {
+      const float u = rng.next_float(), v = rng.next_float();
+      const Hit hit = tracer.closest(from.position, leave(from, square_to_cosine_hemisphere(u, v)));
+      if (!hit || hit.back) continue;
+      const Object& object = tracer.scene().objects[hit.object];
+      of_receiver +=
+          static_cast<double>(irradiance(tracer, light, shading_point(object, hit.triangle, hit.b1, hit.b2, hit.back)));
+    }
+    sum += of_receiver * of_receiver;
+  }
+  return sum;
 }
 
 /// ρ/π, the mean of the channels.
@@ -114,17 +142,31 @@ float reflectance(const Scene& scene, const Object& object, uint32_t triangle, f
 absl::StatusOr<SampleLights> SampleLights::create(const RayTracer& tracer, const Plan& ground, int count,
                                                   const Parallel& how) {
   SampleLights out;
-  out.lights_.resize(static_cast<size_t>(count));
+  const size_t lights = static_cast<size_t>(count);
   const absl::Status cancelled = absl::CancelledError("cancelled while choosing parameters");
   Parallel quiet = how;
   quiet.progress = nullptr;
-  if (!parallel_for(out.lights_.size(), quiet,
-                    [&](uint64_t i) { out.lights_[i] = light_at(tracer, ground, i, out.lights_.size()); })) {
+  constexpr size_t kAttempts = 4;
+  std::vector<Light> tried(kAttempts * lights);
+  std::vector<double> energies(tried.size());
+  const std::vector<uint32_t> some = stratified(front_receivers(ground.receivers), kLookingReceivers, kSeed);
+  if (!parallel_for(tried.size(), quiet, [&](uint64_t i) {
+        tried[i] = light_at(tracer, ground, i % lights, lights, i / lights);
+        energies[i] = energy(tracer, ground, some, tried[i]);
+      })) {
     return cancelled;
+  }
+  std::vector<double> sorted(energies.begin(), energies.begin() + count);
+  std::sort(sorted.begin(), sorted.end());
+  for (size_t i = 0; i < lights; ++i) {
+    size_t best = i;
+    for (size_t k = i + lights; k < tried.size() && energies[best] < kWasted * sorted[lights / 2]; k += lights) {
+      if (energies[k] > energies[best]) best = k;
+    }
+    out.lights_.push_back(tried[best]);
   }
 
   const Scene& scene = tracer.scene();
-  const size_t lights = out.lights_.size();
   out.radiance_.resize(ground.receivers.all.size() * lights);
   const bool done = parallel_for(ground.receivers.all.size(), quiet, [&](uint64_t i) {
     const Receiver& r = ground.receivers.all[i];

@@ -20,16 +20,16 @@ constexpr uint64_t kMostProbes = 30000;
 constexpr double kBandlimit = 0.82, kRelight = 0.15, kCompression = 0.35;
 // Where it is all that can be had, the rest is to add little to it.
 constexpr double kOfBest = 0.92;
-// The knee: k times the bytes are worth k^-(1/3) times the error.
-constexpr double kKnee = 1.0 / 3;
+// The knee: k times the bytes are worth k^-¼ times the error.
+constexpr double kKnee = 0.25;
 constexpr int kRelightRays[] = {512, 1024, 2048, 4096, 8192};
 // Thresholds, times the target. Looser ones also lose more of the noise: the middle one is tried first.
 constexpr double kMiddle = 0.5, kTight = 0.25, kLoose[] = {1.4, 1, 0.7};
 constexpr double kFalling = 0.95;
 constexpr int kRanks[] = {32, 64};
 constexpr double kSurfaceBytes = 24, kNearTexelBytes = 6;  // per receiver
-constexpr double kProbeBytes = 200;                         // besides its rays
-constexpr int kTypicalOrder = 6;  // with which compression is tried before the order is known
+constexpr double kProbeBytes = 200;                        // besides its rays
+constexpr int kTypicalOrder = 6;                           // with which compression is tried before the order is known
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 float spacing_of(float base, int step) {

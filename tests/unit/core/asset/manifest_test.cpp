@@ -121,7 +121,7 @@ TEST(Manifest, EveryCountIsChecked) {
 
 TEST(Manifest, NameLengthsMustAddUp) {
   const Bytes good = encode_manifest(sample_manifest());
-  const size_t name_bytes = 160 + 88;  // of the first object
+  const size_t name_bytes = 176 + 88;  // of the first object
   ASSERT_EQ(peek<uint32_t>(good, name_bytes), 5u);
   for (const uint32_t wrong : {4u, 6u, 0xffffffffu}) {
     EXPECT_THAT(error_of(with_crc(poke(good, name_bytes, wrong))), HasSubstr("strings")) << wrong;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <map>
 
 #include "core/base/sampling.h"
@@ -186,6 +187,33 @@ TEST(Gather, AddsToTheRowAndStartsAnew) {
   std::fill(again.begin(), again.end(), 0.0f);
   gatherer.add_row(level.point(50, 3, 4), again);
   EXPECT_EQ(first, again);
+}
+
+TEST(Gather, RingsAddUpToWhatSmallerNearFieldsLeave) {
+  const GatherLevel level = crate_level();
+  const ReceiverSearch surfaces(*level.tracer, level.layout, level.receivers);
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  constexpr float kReach[] = {0, 0.2f, 0.6f, kInfinity};
+  for (uint32_t r = 0; r < level.receivers.all.size(); r += 7) {
+    const GatherPoint point = level.point(r, 4, 0);
+    Gatherer rings(*level.tracer, nullptr, &surfaces, {level.probes, level.ids}, {2, 256, true, 0.6f, true});
+    rings.shoot(point);
+    std::vector<float> sum(4 * 9, 0.0f);
+    std::vector<NearTexel> nearest;
+    for (const size_t k : {2, 1, 0}) {
+      rings.add_ring(kReach[k], kReach[k + 1], sum);
+      Gatherer whole(*level.tracer, nullptr, &surfaces, {level.probes, level.ids}, {2, 256, true, kReach[k]});
+      std::vector<float> row(4 * 9, 0.0f);
+      whole.add_row(point, row);
+      for (size_t i = 0; i < row.size(); ++i) EXPECT_NEAR(sum[i], row[i], 1e-5f) << "reach " << kReach[k];
+      if (k == 1) nearest.assign(whole.near().begin(), whole.near().end());
+    }
+    ASSERT_EQ(rings.near().size(), nearest.size());
+    for (size_t i = 0; i < nearest.size(); ++i) {
+      EXPECT_EQ(rings.near()[i].receiver, nearest[i].receiver);
+      EXPECT_EQ(rings.near()[i].rays, nearest[i].rays);
+    }
+  }
 }
 
 TEST(Gather, WhatIsNearIsReadFromItsOwnTexel) {
