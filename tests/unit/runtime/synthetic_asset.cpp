@@ -182,6 +182,7 @@ SyntheticAsset empty_asset(int order, int relight_rays) {
   asset.manifest.params.order = order;
   asset.manifest.params.relight_rays = relight_rays;
   asset.manifest.params.spacing = 1;
+  asset.manifest.params.near_field = 0.5f;
   asset.manifest.bounds = {{0, 0, 0}, {1, 1, 1}};
   return asset;
 }

@@ -68,6 +68,7 @@ TEST(Manifest, RoundTrip) {
 TEST(Manifest, OfAnEmptyLevel) {
   Manifest m;
   m.params.spacing = 1;
+  m.params.near_field = 0.5f;
   const auto back = decode_manifest(encode_manifest(m));
   ASSERT_TRUE(back.ok()) << back.status();
   EXPECT_TRUE(back->bounds.empty());
@@ -103,14 +104,14 @@ TEST(Manifest, EveryFlippedBitIsRejected) {
 TEST(Manifest, MagicAndVersion) {
   const Bytes good = encode_manifest(sample_manifest());
   EXPECT_THAT(error_of(poke<uint32_t>(good, 0, 0)), HasSubstr("does not start with LOOM"));
-  const auto newer = decode_manifest(poke<uint32_t>(good, 4, 4));
+  const auto newer = decode_manifest(poke<uint32_t>(good, 4, 5));
   EXPECT_EQ(newer.status().code(), absl::StatusCode::kUnimplemented);
-  EXPECT_THAT(std::string(newer.status().message()), HasSubstr("version 4"));
+  EXPECT_THAT(std::string(newer.status().message()), HasSubstr("version 5"));
 }
 
 TEST(Manifest, EveryCountIsChecked) {
   const Bytes good = encode_manifest(sample_manifest());
-  for (const size_t at : {8u, 12u, 16u, 20u, 24u, 28u, 132u}) {  // six counts, bytes of the method version
+  for (const size_t at : {8u, 12u, 16u, 20u, 24u, 28u, 140u}) {  // six counts, bytes of the method version
     const uint32_t count = peek<uint32_t>(good, at);
     for (const uint32_t wrong : {count - 1, count + 1, count + 100, 0x20000000u, 0x7fffffffu, 0xffffffffu}) {
       if (at == 24 && wrong == 4) continue;  // a fourth, unused entry lies where zeros pad the three: harmless

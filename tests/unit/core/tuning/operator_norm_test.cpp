@@ -52,6 +52,7 @@ TEST(OperatorNorm, UnderAnOpenSkyIsWhatTheOrderCannotTell) {
 TEST(OperatorNorm, OfAProbeAtTheReceiverIsSmall) {
   PlannedLevel level(test::closed_box({4, 4, 4}), 8, 8);
   ASSERT_EQ(level.plan.placement.probes.size(), 1u);
+  level.plan.params.near_field = 0;
   const uint32_t r = receiver_at(level, {2, 0, 2});
   const Receiver& receiver = level.plan.receivers.all[r];
   const double far = norms(level, {r})[0];
@@ -73,7 +74,8 @@ TEST(OperatorNorm, OfWhatNoProbeSeesIsOne) {
 
 TEST(OperatorNorm, FallsWithMoreProbesAndHigherOrders) {
   PlannedLevel coarse(test::room_with_crate(), 4, 2), fine(test::room_with_crate(), 1, 2);
-  const auto of = [](const PlannedLevel& level) {
+  const auto of = [](PlannedLevel& level) {
+    level.plan.params.near_field = 0.25f;
     return mean(norms(level, stratified(front_receivers(level.plan.receivers), 12, 1)));
   };
   const double many = of(fine), few = of(coarse);
