@@ -201,9 +201,12 @@ absl::Status run(const Options& o) {
   control.progress = [&](const std::string& stage, uint64_t done, uint64_t total, uint64_t rays) {
     bar.update(stage, done, total, rays);
   };
+  const BakeParams* of_earlier = earlier ? &earlier->manifest.params : nullptr;
+  if (!o.farm.server.empty() && o.how.target(of_earlier)) {
+    LL_RETURN_IF_ERROR(o.farm.connect().check_server());  // before time is spent on parameters
+  }
   std::optional<Tuning> tuning;
-  LL_ASSIGN_OR_RETURN(const BakeParams params,
-                      o.how.tuned(*level.tracer, earlier ? &earlier->manifest.params : nullptr, control, &tuning));
+  LL_ASSIGN_OR_RETURN(const BakeParams params, o.how.tuned(*level.tracer, of_earlier, control, &tuning));
   bar.finish();
   if (tuning && !o.farm.json) print(*tuning);
   std::string anew;

@@ -12,8 +12,8 @@ constexpr float kDefaultError = 0.05f;
 std::vector<Option> BakeOptions::options() {
   return {
       {"--error",
-       "choose the cheapest model by its estimated relative error (RMS, one bounce), in place of the options from "
-       "--spacing to --threshold",
+       "the smallest model of about this relative error (RMS, one bounce), in place of the options from --spacing to "
+       "--threshold; with one of those, the others have the values given with them [0.05]",
        &error_},
       {"--budget", "choose the most accurate model of about so many bytes at most, like 32MB; 0: no budget",
        SizeOption{&budget_}},
@@ -51,7 +51,7 @@ std::string BakeOptions::fixed() const {
 std::optional<TuneTarget> BakeOptions::target(const BakeParams* earlier) const {
   if (earlier != nullptr && !retune_) return std::nullopt;
   if (budget_ > 0) return TuneTarget{0, budget_};
-  if (!error_ && !retune_) return std::nullopt;
+  if (!error_ && !retune_ && !fixed().empty()) return std::nullopt;
   return TuneTarget{static_cast<double>(error_.value_or(kDefaultError)), 0};
 }
 

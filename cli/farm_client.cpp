@@ -171,10 +171,7 @@ absl::Status FarmClient::upload_chunks(const EarlierBake& earlier, std::vector<D
   return absl::OkStatus();
 }
 
-absl::StatusOr<RemoteJob> FarmClient::submit(std::span<const uint8_t> scene, const BakeParams& params,
-                                             const EarlierBake* earlier, const std::string& name, int32_t priority,
-                                             const std::function<void(uint64_t)>& progress) {
-  // Before the level goes up: a server that would refuse it.
+absl::Status FarmClient::check_server() {
   v1::ServerInfo info;
   LL_RETURN_IF_ERROR(
       in_words(connection_->call(&v1::JobService::Stub::GetServerInfo, v1::GetServerInfoRequest(), &info)));
@@ -183,6 +180,13 @@ absl::StatusOr<RemoteJob> FarmClient::submit(std::span<const uint8_t> scene, con
                                          "', this program by '" + std::string(kMethodVersion) +
                                          "': install the same release of lightloom on both");
   }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<RemoteJob> FarmClient::submit(std::span<const uint8_t> scene, const BakeParams& params,
+                                             const EarlierBake* earlier, const std::string& name, int32_t priority,
+                                             const std::function<void(uint64_t)>& progress) {
+  LL_RETURN_IF_ERROR(check_server());  // before the level goes up
   const auto digest = connection_->blobs.upload(scene, progress);
   if (!digest.ok()) return in_words(digest.status());
 

@@ -72,6 +72,8 @@ class FarmClient {
   absl::StatusOr<RemoteJob> submit(std::span<const uint8_t> scene, const BakeParams& params, const EarlierBake* earlier,
                                    const std::string& name, int32_t priority,
                                    const std::function<void(uint64_t)>& progress);
+  /// Whether it answers, and bakes as this program does; submit() asks too.
+  absl::Status check_server();
   absl::StatusOr<Digest> upload(std::span<const uint8_t> blob);
   absl::StatusOr<RemoteJob> job(uint64_t id);
   absl::StatusOr<std::vector<RemoteJob>> jobs();

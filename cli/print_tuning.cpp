@@ -54,7 +54,7 @@ void print(const Tuning& t) {
       m.parts.total(), m.parts.bandlimit, m.parts.unseen, m.parts.noise, m.parts.relight, m.parts.truncation,
       m.parts.fp16, human_bytes(m.bytes).c_str());
   if (!t.met) {
-    std::printf("  the target is out of reach: more probes would cost more and more for less and less\n");
+    std::printf("  the target is out of reach: a finer model would cost more and more for less and less\n");
   }
   if (t.next) {
     std::printf("  the next finer spacing, %.3g m: about %.4f with %s\n", static_cast<double>(t.next->params.spacing),

@@ -48,10 +48,11 @@ absl::Status run(const Options& o) {
   control.progress = [&](const std::string& stage, uint64_t done, uint64_t total, uint64_t rays) {
     bar.update(stage, done, total, rays);
   };
+  FarmClient farm = o.farm->connect();
+  LL_RETURN_IF_ERROR(farm.check_server());  // before time is spent on parameters
   LL_ASSIGN_OR_RETURN(const BakeParams params,
                       o.how.tuned(*level.tracer, earlier ? &earlier->manifest.params : nullptr, control, nullptr));
   bar.finish();
-  FarmClient farm = o.farm->connect();
   LL_ASSIGN_OR_RETURN(const RemoteJob job,
                       submit_level(&farm, o.scene, params, earlier ? &*earlier : nullptr, o.name, o.priority));
   if (o.farm->json) {

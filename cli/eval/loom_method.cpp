@@ -124,7 +124,7 @@ class LoomMethod : public Method {
                     "rank by threshold 0.005, 8000 relight rays (lightloom bake --method sl17). Its probe counts are "
                     "multiples of "
                     "the default's."
-                  : "lightloom bake, lit by the runtime.";
+                  : "lightloom bake with settings by hand: those that --help gives, or as said; lit by the runtime.";
   }
 
   std::vector<Variant> sweep(const LitLevel& level, bool quick) const override {
@@ -212,8 +212,9 @@ class TunedMethod : public Method {
   std::string title() const override { return "lightloom --error"; }
   std::string version() const override { return std::string(kTunerVersion); }
   std::string about() const override {
-    return "lightloom bake --error E: spacing, order, rays and rank chosen for a target, by lights of the level's own "
-           "space. Its seconds include the choice.";
+    return "lightloom bake, which is --error 0.05, and others: spacing, near field, order, rays and rank chosen for a "
+           "target, "
+           "by lights of the level's own space. Its seconds include the choice.";
   }
   std::vector<Variant> sweep(const LitLevel&, bool quick) const override {
     std::vector<Variant> out;

@@ -278,9 +278,7 @@ RelightResult bake_relight(const RayTracer& tracer, const Plan& plan, const Rece
     }
     const Object& object = scene.objects[hit.object];
     float reach = 0;
-    if (!hit.back || scene.materials[object.triangles[hit.triangle].material].double_sided) {
-      receiver[i] = receivers.locate(hit, &reach);
-    }
+    if (!is_dark_back(scene, hit)) receiver[i] = receivers.locate(hit, &reach);
     recorder.hit(tracer.position(hit), reach);
     if (receiver[i] == Receivers::kNone) continue;
     const uint32_t o = plan.receivers.all[receiver[i]].object;

@@ -31,8 +31,7 @@ void filter_distances(const RayTracer& tracer, Vec3 probe, float farthest, uint3
     const Hit hit = tracer.closest(probe, direction);
     // What shows its back is made to look near (2021: a fifth of the distance), so that the probe lights nothing around
     // it. Backs that have light of their own are surfaces like others.
-    const bool dark =
-        hit && hit.back && !scene.materials[scene.objects[hit.object].triangles[hit.triangle].material].double_sided;
+    const bool dark = hit && is_dark_back(scene, hit);
     seen.push_back({direction, std::min(dark ? 0.2f * hit.t : hit.t, farthest)});
   }
   for (size_t y = 0; y < 14; ++y) {

@@ -78,9 +78,8 @@ std::vector<Unseen> unseen_hits(const RayTracer& tracer, const Receivers& receiv
       const Hit hit = tracer.closest(receiver.point.position, direction);
       Unseen target{receiver.point.position, direction, !hit};
       if (hit) {
-        const Object& object = scene.objects[hit.object];
-        if (hit.back && !scene.materials[object.triangles[hit.triangle].material].double_sided) continue;
-        target.to = shading_point(object, hit.triangle, hit.b1, hit.b2, hit.back).position;
+        if (is_dark_back(scene, hit)) continue;
+        target.to = shading_point(scene.objects[hit.object], hit.triangle, hit.b1, hit.b2, hit.back).position;
       }
       const bool seen = std::any_of(near.begin(), near.end(), [&](const ProbeGrid::Near& n) {
         return target.seen_from(tracer, probes[n.probe].position);

@@ -68,7 +68,7 @@ Vec3 trace_path(const RayTracer& tracer, Vec3 origin, Vec3 direction, int bounce
     if (!hit) return radiance + throughput * scene.environment;
     const Object& object = scene.objects[hit.object];
     const Triangle& triangle = object.triangles[hit.triangle];
-    if (hit.back && !scene.materials[triangle.material].double_sided) return radiance;
+    if (is_dark_back(scene, hit)) return radiance;
     if (!hit.back) radiance += throughput * emission_at(scene, object, triangle, hit.b1, hit.b2);
     if (depth > bounces) return radiance;
 

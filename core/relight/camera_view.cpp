@@ -14,7 +14,7 @@ Vec3 shade(const RayTracer& tracer, const SurfaceElements& elements, const Recei
   const Scene& scene = tracer.scene();
   const Object& object = scene.objects[hit.object];
   const Triangle& t = object.triangles[hit.triangle];
-  if (hit.back && !scene.materials[t.material].double_sided) return {};
+  if (is_dark_back(scene, hit)) return {};
   if (layer == Layer::kAlbedo) return albedo_at(scene, object, t, hit.b1, hit.b2);
   Vec3 light;
   if (layer != Layer::kDirect) light += sample_irradiance(elements, search, irradiance, hit);

@@ -26,6 +26,11 @@ struct Hit {
   explicit operator bool() const { return object != kNone; }
 };
 
+/// Of a hit: the back of a single-sided surface, which blocks light, and neither reflects nor emits any.
+inline bool is_dark_back(const Scene& scene, const Hit& hit) {
+  return hit.back && !scene.materials[scene.objects[hit.object].triangles[hit.triangle].material].double_sided;
+}
+
 /// Thread-safe after construction. Keeps a reference to the scene, which must outlive it unchanged.
 class RayTracer {
  public:

@@ -63,8 +63,7 @@ Gatherer::Sample Gatherer::trace(const GatherRay& ray) {
   const Object& object = scene.objects[hit.object];
   const ShadingPoint y = shading_point(object, hit.triangle, hit.b1, hit.b2, hit.back);
   float reach = 0;
-  // Single-sided back hits block and emit nothing.
-  if (!hit.back || scene.materials[object.triangles[hit.triangle].material].double_sided) {
+  if (!is_dark_back(scene, hit)) {
     s.kind = Sample::kSurface;
     s.position = y.position;
     s.normal = y.geometric;

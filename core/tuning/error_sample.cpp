@@ -21,11 +21,6 @@ absl::Status cancelled() { return absl::CancelledError("cancelled while choosing
 
 uint64_t batch_seed(uint64_t seed, uint32_t batch) { return hash_combine(seed, kSeed + batch); }
 
-/// Single-sided surfaces do not from behind.
-bool shines(const Scene& scene, const Hit& hit) {
-  return hit && (!hit.back || scene.materials[scene.objects[hit.object].triangles[hit.triangle].material].double_sided);
-}
-
 /// Mean over lights of √(error² ÷ energy): what is estimated without bias may come out below zero for one of them. It is the power
 /// mean of exponent ¼: near the geometric one, by which renderers are compared over many lights, but a zero is no harm.
 double relative(const std::vector<double>& error2, const std::vector<double>& energy, double typical) {
@@ -68,7 +63,7 @@ absl::StatusOr<std::unique_ptr<ErrorSample>> ErrorSample::create(const RayTracer
       for (uint32_t k = 0; k < kBatchRays; ++k) {
         const GatherRay ray = gather_ray(point, k, strata, &rng);
         const Hit hit = tracer.closest(ray.origin, ray.direction);
-        if (!shines(scene, hit)) continue;
+        if (!hit || is_dark_back(scene, hit)) continue;
         out->lights_.radiance_at(tracer, hit, radiance);
         for (size_t l = 0; l < lights; ++l) e[l] += kPi / kBatchRays * radiance[l];
       }
@@ -90,7 +85,7 @@ absl::StatusOr<std::unique_ptr<ErrorSample>> ErrorSample::create(const RayTracer
 
 std::span<const float> ErrorSample::radiance(Vec3 origin, Vec3 direction) const {
   const Hit hit = tracer_.closest(origin, direction);
-  if (!shines(tracer_.scene(), hit)) return {};
+  if (!hit || is_dark_back(tracer_.scene(), hit)) return {};
   const uint32_t texel = search_.locate(hit);
   return texel == Receivers::kNone ? std::span<const float>() : lights_.radiance(texel);
 }

@@ -47,10 +47,9 @@ std::vector<Sight> look_around(const RayTracer& tracer, Vec3 probe, uint64_t see
       sight.kind = Sight::kSky;
       continue;
     }
-    const Object& object = scene.objects[hit.object];
-    if (hit.back && !scene.materials[object.triangles[hit.triangle].material].double_sided) continue;
+    if (is_dark_back(scene, hit)) continue;
     sight.kind = Sight::kSurface;
-    sight.position = shading_point(object, hit.triangle, hit.b1, hit.b2, hit.back).position;
+    sight.position = shading_point(scene.objects[hit.object], hit.triangle, hit.b1, hit.b2, hit.back).position;
   }
   return out;
 }
@@ -66,9 +65,7 @@ Functional cosine(const RayTracer& tracer, const ReceiverSearch& surfaces, float
   for (uint32_t r = 0; r < kGatherRays; ++r) {
     const GatherRay ray = gather_ray(point, r, strata, &rng);
     const Hit hit = tracer.closest(ray.origin, ray.direction);
-    if (hit && hit.back && !scene.materials[scene.objects[hit.object].triangles[hit.triangle].material].double_sided) {
-      continue;
-    }
+    if (hit && is_dark_back(scene, hit)) continue;
     if (hit && hit.t < near && surfaces.locate(hit) != Receivers::kNone) continue;
     sh_evaluate(kOrder, ray.direction, y);
     for (size_t l = 0; l < kCount; ++l) out[l] += static_cast<double>(kPi / kGatherRays * y[l]);

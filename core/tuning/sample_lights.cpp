@@ -121,7 +121,7 @@ double energy(const RayTracer& tracer, const Plan& ground, std::span<const uint3
     for (uint32_t k = 0; k < kLooks; ++k) {
       const float u = rng.next_float(), v = rng.next_float();
       const Hit hit = tracer.closest(from.position, leave(from, square_to_cosine_hemisphere(u, v)));
-      if (!hit || hit.back) continue;
+      if (!hit || is_dark_back(tracer.scene(), hit)) continue;
       const Object& object = tracer.scene().objects[hit.object];
       of_receiver +=
           static_cast<double>(irradiance(tracer, light, shading_point(object, hit.triangle, hit.b1, hit.b2, hit.back)));

@@ -108,7 +108,11 @@ class Tuner {
 
   absl::StatusOr<Tuning> for_bytes(uint64_t bytes) {
     const auto most = static_cast<double>(bytes);
-    std::vector<std::pair<double, Choice>> fitting;  // by total error
+    struct Fitting {
+      Choice choice;
+      double total, bytes;  // as estimated
+    };
+    std::vector<Fitting> fitting;
     double least = kInfinity, best = kInfinity;
     for (int step = kCoarsest; can_go(step); ++step) {
       LL_ASSIGN_OR_RETURN(const Trial* at, trial(step));
@@ -122,17 +126,19 @@ class Tuner {
           if (m.bytes > most) break;  // higher orders take more
           fits = true;
           best = std::min(best, m.parts.total());
-          fitting.emplace_back(m.parts.total(), choice);
+          fitting.push_back({choice, m.parts.total(), m.bytes});
         }
       }
-      if (!fits && !fitting.empty() && step > fitting.back().second.step + 1) break;  // finer ones take more
+      if (!fits && !fitting.empty() && step > fitting.back().choice.step + 1) break;  // finer ones take more
     }
-    std::stable_sort(fitting.begin(), fitting.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-    for (const auto& [total, choice] : fitting) {
-      LL_ASSIGN_OR_RETURN(Tuning out, finish(choice));
-      if (out.chosen.bytes > most) continue;
-      out.met = true;
-      return out;
+    std::stable_sort(fitting.begin(), fitting.end(), [](const auto& a, const auto& b) { return a.total < b.total; });
+    double above = 1;  // how far estimates have been too low
+    for (const Fitting& f : fitting) {
+      if (f.bytes * above > most) continue;
+      LL_ASSIGN_OR_RETURN(Tuning out, finish(f.choice));
+      out.met = out.chosen.bytes <= most;
+      if (out.met) return out;
+      above = std::max(above, out.chosen.bytes / f.bytes);
     }
     return absl::InvalidArgumentError("--budget is too small: the least model of this level takes about " +
                                       std::to_string(static_cast<uint64_t>(least)) +
