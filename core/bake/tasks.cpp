@@ -276,7 +276,6 @@ RelightResult bake_relight(const RayTracer& tracer, const Plan& plan, const Rece
       recorder.sky(direction);
       continue;
     }
-    const Object& object = scene.objects[hit.object];
     float reach = 0;
     if (!is_dark_back(scene, hit)) receiver[i] = receivers.locate(hit, &reach);
     recorder.hit(tracer.position(hit), reach);

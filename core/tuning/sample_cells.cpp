@@ -11,7 +11,7 @@
 namespace lightloom {
 namespace {
 
-constexpr size_t kShare = 16, kMost = 4;  // of the cells
+constexpr size_t kShare = 12, kMost = 6;  // of the cells
 constexpr uint32_t kRelightRays = 512;    // it is only asked how E changes
 constexpr size_t J = kMaxShCount, kOrders = kMaxShOrder + 1;
 

@@ -113,23 +113,29 @@ class Tuner {
       double total, bytes;  // as estimated
     };
     std::vector<Fitting> fitting;
-    double least = kInfinity, best = kInfinity;
+    double least = kInfinity, best = kInfinity, of_coarser = kInfinity;
     for (int step = kCoarsest; can_go(step); ++step) {
       LL_ASSIGN_OR_RETURN(const Trial* at, trial(step));
       bool fits = false;
+      double of_step = kInfinity;  // the least that was too much
       for (size_t reach = 0; reach < kReaches.size(); ++reach) {
         for (int order = 1; order <= kMaxShOrder; ++order) {
           const Choice choice{step, reach, order, at->bandlimit(reach, order) / kOfBest};
           if (choice.error > 1.02 * best) continue;  // no better, whatever it takes
           LL_ASSIGN_OR_RETURN(const TunedModel m, estimate(choice));
           least = std::min(least, m.bytes);
-          if (m.bytes > most) break;  // higher orders take more
+          if (m.bytes > most) {  // higher orders take more
+            of_step = std::min(of_step, m.bytes);
+            break;
+          }
           fits = true;
           best = std::min(best, m.parts.total());
           fitting.push_back({choice, m.parts.total(), m.bytes});
         }
       }
-      if (!fits && !fitting.empty() && step > fitting.back().choice.step + 1) break;  // finer ones take more
+      if (fits || of_step == kInfinity) continue;
+      if (of_step > of_coarser) break;  // finer ones take more
+      of_coarser = of_step;
     }
     std::stable_sort(fitting.begin(), fitting.end(), [](const auto& a, const auto& b) { return a.total < b.total; });
     double above = 1;  // how far estimates have been too low
@@ -311,14 +317,17 @@ class Tuner {
     };
     CompressionChoice choice;
     choice.order = order;
+    constexpr int kCounts = static_cast<int>(std::size(SampleCells::kRays));
+    int rays = kCounts / 2;
     for (const int rank : kRanks) {
       choice.max_rank = rank;
-      for (const int rays : SampleCells::kRays) {
-        if (rays < best.choice.rays && rank > kRanks[0]) continue;
-        choice.rays = rays;
+      for (bool fewer = false; rays >= 0 && rays < kCounts; rays += fewer ? -1 : 1) {
+        choice.rays = SampleCells::kRays[rays];
         LL_ASSIGN_OR_RETURN(const bool better, attempt(choice, kMiddle));
-        if (enough() || !better) break;
+        if (!better || (enough() && !fewer && rays != kCounts / 2)) break;
+        fewer = enough();
       }
+      rays = kCounts - 1;
       if (enough()) break;
       LL_RETURN_IF_ERROR(attempt(best.choice, kTight).status());
       if (enough()) break;
