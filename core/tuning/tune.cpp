@@ -306,7 +306,7 @@ class Tuner {
     Compressed best;
     best.cost.error = kInfinity;
     const auto enough = [&] { return best.cost.error <= kCompression * error; };
-    /// Whether it is better, or enough.
+    // Whether it is better, or enough.
     const auto attempt = [&](CompressionChoice choice, double threshold) -> absl::StatusOr<bool> {
       choice.threshold = static_cast<float>(std::clamp(threshold * error, 0.002, 0.5));
       LL_ASSIGN_OR_RETURN(const CompressionCost cost, cells.compress(choice, how));
@@ -317,28 +317,26 @@ class Tuner {
     };
     CompressionChoice choice;
     choice.order = order;
-    constexpr int kCounts = static_cast<int>(std::size(SampleCells::kRays));
-    int rays = kCounts / 2;
+    constexpr size_t kLast = std::size(SampleCells::kRays) - 1;
+    size_t rays = kLast / 2;
     for (const int rank : kRanks) {
       choice.max_rank = rank;
-      for (bool fewer = false; rays >= 0 && rays < kCounts; rays += fewer ? -1 : 1) {
-        choice.rays = SampleCells::kRays[rays];
-        LL_ASSIGN_OR_RETURN(const bool better, attempt(choice, kMiddle));
-        if (!better || (enough() && !fewer && rays != kCounts / 2)) break;
-        fewer = enough();
+      choice.rays = SampleCells::kRays[rays];
+      LL_ASSIGN_OR_RETURN(bool better, attempt(choice, kMiddle));
+      // Fewer rays as long as they are enough, or more until they are.
+      const bool fewer = enough();
+      while (better && enough() == fewer && rays != (fewer ? 0 : kLast)) {
+        choice.rays = SampleCells::kRays[fewer ? --rays : ++rays];
+        LL_ASSIGN_OR_RETURN(better, attempt(choice, kMiddle));
       }
-      rays = kCounts - 1;
       if (enough()) break;
       LL_RETURN_IF_ERROR(attempt(best.choice, kTight).status());
       if (enough()) break;
     }
-    if (enough() && best.choice.threshold >= static_cast<float>(kMiddle * error)) {
-      for (const double threshold : kLoose) {
-        const Compressed before = best;
-        LL_RETURN_IF_ERROR(attempt(best.choice, threshold).status());
-        if (enough() && best.choice.threshold > before.choice.threshold) break;
-        best = before;
-      }
+    const bool tight = best.choice.threshold < static_cast<float>(kMiddle * error);
+    for (size_t i = 0; i < std::size(kLoose) && enough() && !tight; ++i) {
+      LL_ASSIGN_OR_RETURN(const bool taken, attempt(best.choice, kLoose[i]));
+      if (taken) break;
     }
     // With as many rays as were gathered, what is left is what the rank cuts off.
     CompressionChoice quiet = best.choice;

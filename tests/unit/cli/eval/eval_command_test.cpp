@@ -147,6 +147,24 @@ TEST_F(BakeError, ChoosesAndRecordsAndKeeps) {
   EXPECT_EQ(retuned.params.texels_per_metre, manifest.params.texels_per_metre);
 }
 
+TEST_F(BakeError, IsLookedForUnlessASettingIsGivenByHand) {
+  const Result r = run({"bake", scene_, "-o", path("d.loom"), "--texels-per-metre", "1", "--json"});
+  ASSERT_EQ(r.code, 0) << r.err;
+  const auto tuning = nlohmann::json::parse(r.out)["tuning"];
+  EXPECT_TRUE(tuning["error"]["total"].is_number());
+  const BakeParams chosen = test::value_or_die(read_manifest(path("d.loom"))).params;
+  EXPECT_EQ(chosen.order, tuning["order"]);
+  EXPECT_FLOAT_EQ(chosen.near_field, tuning["near_field"]);
+
+  const Result by_hand =
+      run({"bake", scene_, "-o", path("h.loom"), "--texels-per-metre", "1", "--near-field", "0.25", "--json"});
+  ASSERT_EQ(by_hand.code, 0) << by_hand.err;
+  EXPECT_FALSE(nlohmann::json::parse(by_hand.out).contains("tuning"));
+  const BakeParams given = test::value_or_die(read_manifest(path("h.loom"))).params;
+  EXPECT_EQ(given.near_field, 0.25f);
+  EXPECT_EQ(given.order, BakeParams().order);
+}
+
 TEST_F(BakeError, KeepsABudget) {
   const Result r =
       run({"bake", scene_, "-o", path("b.loom"), "--budget", "600KB", "--texels-per-metre", "3", "--json"});
