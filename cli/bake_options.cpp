@@ -110,6 +110,9 @@ absl::Status BakeOptions::check() const {
   if (error_ && !(*error_ > 0 && *error_ <= 1)) {
     return absl::InvalidArgumentError("--error must be above 0, and 1 at most");
   }
+  if (near_field_ && !(*near_field_ >= 0)) {
+    return absl::InvalidArgumentError("--near-field must be 0 or a positive number of metres");
+  }
   if (error_ && budget_ > 0) return absl::InvalidArgumentError("--error and --budget: give one of them");
   if ((error_ || budget_ > 0 || retune_) && !fixed().empty()) {
     return absl::InvalidArgumentError(std::string(error_        ? "--error"

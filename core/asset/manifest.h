@@ -22,12 +22,11 @@ enum class BakeMethod : uint32_t {
 
 /// Everything that the baked numbers depend on besides the scene. Recorded in the asset; a rebake uses the same.
 struct BakeParams {
-  static constexpr float kFollows = -1;
+  static constexpr float kFollows = -1;  ///< near_field: so many spacings as kNearField says
   BakeMethod method = BakeMethod::kDefault;
-  int32_t order = 7;  ///< SH order n of the probes
-  float spacing = 0;  ///< ρ, side of a probe cell, metres; 0 in a request: chosen from the scene
-  float near_field =
-      kFollows;  ///< metres within which a receiver reads texels, not probes; kFollows in a request: from the spacing
+  int32_t order = 7;              ///< SH order n of the probes
+  float spacing = 0;              ///< ρ, side of a probe cell, metres; 0 in a request: chosen from the scene
+  float near_field = kFollows;    ///< metres: texels nearer than that are read, not probes; kFollows in a request
   int32_t probes = 0;             ///< SL17: how many; 0: from the spacing
   int32_t links = 6;              ///< k, probes per receiver; SL17: N_overlap, on average
   int32_t rays = 256;             ///< gather rays per receiver

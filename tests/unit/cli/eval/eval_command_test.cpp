@@ -177,6 +177,9 @@ TEST_F(BakeError, KeepsABudget) {
 
 TEST_F(BakeError, SaysWhatCannotGoTogether) {
   fails(2, {"bake", scene_, "-o", path("o.loom"), "--error", "0"}, "--error must be above 0");
+  fails(2, {"bake", scene_, "-o", path("o.loom"), "--near-field", "-1"}, "--near-field must be 0");
+  fails(2, {"bake", scene_, "-o", path("o.loom"), "--method", "sl17", "--near-field", "1"}, "sl17 has none");
+  fails(2, {"bake", scene_, "-o", path("o.loom"), "--error", "0.1", "--near-field", "1"}, "leave out one of them");
   fails(2, {"bake", scene_, "-o", path("o.loom"), "--error", "0.1", "--budget", "1MB"}, "give one of them");
   fails(2, {"bake", scene_, "-o", path("o.loom"), "--error", "0.1", "--order", "3"}, "leave out one of them");
   fails(2, {"bake", scene_, "-o", path("o.loom"), "--retune", "--spacing", "1"}, "leave out one of them");
