@@ -183,14 +183,11 @@ class LoomMethod : public Method {
     params.texels_per_metre = chosen.texels_per_metre;
     params.lightmap_size = chosen.lightmap_size;
     params.seed = chosen.seed;
-    const auto set = [&](const char* name, int32_t* value) {
-      if (const auto it = settings.find(name); it != settings.end()) *value = static_cast<int32_t>(it->second);
+    const auto set = [&]<typename T>(const char* name, T* value) {
+      if (const auto it = settings.find(name); it != settings.end()) *value = static_cast<T>(it->second);
     };
-    const auto set_metres = [&](const char* name, float* value) {
-      if (const auto it = settings.find(name); it != settings.end()) *value = static_cast<float>(it->second);
-    };
-    set_metres("spacing", &params.spacing);
-    set_metres(kNear, &params.near_field);
+    set("spacing", &params.spacing);
+    set(kNear, &params.near_field);
     set("order", &params.order);
     set("probes", &params.probes);
     set("links", &params.links);
@@ -213,8 +210,7 @@ class TunedMethod : public Method {
   std::string version() const override { return std::string(kTunerVersion); }
   std::string about() const override {
     return "lightloom bake, which is --error 0.05, and others: spacing, near field, order, rays and rank chosen for a "
-           "target, "
-           "by lights of the level's own space. Its seconds include the choice.";
+           "target, by lights of the level's own space. Its seconds include the choice.";
   }
   std::vector<Variant> sweep(const LitLevel&, bool quick) const override {
     std::vector<Variant> out;

@@ -111,21 +111,31 @@ float irradiance(const RayTracer& tracer, const Light& light, const ShadingPoint
   return tracer.occluded(p.position, in.to_light, in.distance) ? 0 : in.irradiance.x * cosine;
 }
 
-/// What it reflects to a few receivers, squared: a rough idea of its energy.
-double energy(const RayTracer& tracer, const Plan& ground, std::span<const uint32_t> receivers, const Light& light) {
-  double sum = 0;
+/// What a few receivers see along a few rays each.
+std::vector<std::vector<ShadingPoint>> seen_by(const RayTracer& tracer, const Plan& ground,
+                                               std::span<const uint32_t> receivers) {
+  std::vector<std::vector<ShadingPoint>> out;
   for (const uint32_t r : receivers) {
     const ShadingPoint& from = ground.receivers.all[r].point;
     Rng rng(hash_combine(kSeed, r));
-    double of_receiver = 0;
+    out.emplace_back();
     for (uint32_t k = 0; k < kLooks; ++k) {
       const float u = rng.next_float(), v = rng.next_float();
       const Hit hit = tracer.closest(from.position, leave(from, square_to_cosine_hemisphere(u, v)));
       if (!hit || is_dark_back(tracer.scene(), hit)) continue;
       const Object& object = tracer.scene().objects[hit.object];
-      of_receiver +=
-          static_cast<double>(irradiance(tracer, light, shading_point(object, hit.triangle, hit.b1, hit.b2, hit.back)));
+      out.back().push_back(shading_point(object, hit.triangle, hit.b1, hit.b2, hit.back));
     }
+  }
+  return out;
+}
+
+/// What a light does there, by receiver, squared: a rough idea of its energy.
+double energy(const RayTracer& tracer, const std::vector<std::vector<ShadingPoint>>& seen, const Light& light) {
+  double sum = 0;
+  for (const auto& of : seen) {
+    double of_receiver = 0;
+    for (const ShadingPoint& point : of) of_receiver += static_cast<double>(irradiance(tracer, light, point));
     sum += of_receiver * of_receiver;
   }
   return sum;
@@ -149,10 +159,10 @@ absl::StatusOr<SampleLights> SampleLights::create(const RayTracer& tracer, const
   constexpr size_t kAttempts = 4;
   std::vector<Light> tried(kAttempts * lights);
   std::vector<double> energies(tried.size());
-  const std::vector<uint32_t> some = stratified(front_receivers(ground.receivers), kLookingReceivers, kSeed);
+  const auto seen = seen_by(tracer, ground, stratified(front_receivers(ground.receivers), kLookingReceivers, kSeed));
   if (!parallel_for(tried.size(), quiet, [&](uint64_t i) {
         tried[i] = light_at(tracer, ground, i % lights, lights, i / lights);
-        energies[i] = energy(tracer, ground, some, tried[i]);
+        energies[i] = energy(tracer, seen, tried[i]);
       })) {
     return cancelled;
   }

@@ -54,7 +54,7 @@ struct Trial {
 
   double bandlimit(size_t reach, int order) const { return errors[reach].bandlimit[static_cast<size_t>(order)]; }
   double best() const {
-    double least = std::numeric_limits<double>::infinity();
+    double least = kInfinity;
     for (const ProbeErrors& e : errors) {
       least = std::min(least, *std::min_element(e.bandlimit.begin() + 1, e.bandlimit.end()));
     }
