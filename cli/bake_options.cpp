@@ -28,6 +28,10 @@ std::vector<Option> BakeOptions::options() {
       {"--rays", "gather rays per receiver, rounded up to a × b with a ≤ b ≤ 2a [256]", &rays_},
       {"--relight-rays", "rays of each probe at run time [4096; sl17: 8000]", &relight_rays_},
       {"--max-rank", "most coefficients of a cluster [32]", &max_rank_},
+      {"--average",
+       "texels over which transport is averaged to decide what a cluster keeps; 0: none [0, but 1 where --error or "
+       "--budget chooses]",
+       &average_},
       {"--threshold", "relative error at which a cluster's rank ends [0.02; sl17: 0.005]", &threshold_},
       {"--cell-receivers", "a bake cell holds fewer receivers than this [1024]", &cell_receivers_},
       {"--texels-per-metre", "lightmap density [0: chosen from the level]", &texels_per_metre_},
@@ -45,6 +49,7 @@ std::string BakeOptions::fixed() const {
   if (rays_) return "--rays";
   if (relight_rays_) return "--relight-rays";
   if (max_rank_) return "--max-rank";
+  if (average_) return "--average";
   return threshold_ ? "--threshold" : "";
 }
 
@@ -95,6 +100,7 @@ BakeParams BakeOptions::params(const BakeParams* earlier) const {
   set(&p.rays, rays_);
   set(&p.relight_rays, relight_rays_);
   set(&p.max_rank, max_rank_);
+  set(&p.average, average_);
   set(&p.threshold, threshold_);
   set(&p.cell_receivers, cell_receivers_);
   set(&p.texels_per_metre, texels_per_metre_);

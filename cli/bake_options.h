@@ -30,7 +30,7 @@ class BakeOptions {
 
   std::string method_;
   std::optional<int> order_, probes_, links_, rays_, relight_rays_, max_rank_, cell_receivers_, lightmap_size_;
-  std::optional<float> spacing_, near_field_, threshold_, texels_per_metre_, error_;
+  std::optional<float> spacing_, near_field_, average_, threshold_, texels_per_metre_, error_;
   uint64_t budget_ = 0;
   bool retune_ = false;
   std::optional<uint64_t> seed_;

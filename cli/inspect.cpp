@@ -112,6 +112,7 @@ nlohmann::json to_json(const Manifest& m, const Summary& s, bool with_cells) {
         {"rays", m.params.rays},
         {"relight_rays", m.params.relight_rays},
         {"max_rank", m.params.max_rank},
+        {"average", m.params.average},
         {"threshold", m.params.threshold},
         {"texels_per_metre", m.params.texels_per_metre},
         {"lightmap_size", m.params.lightmap_size},

@@ -15,6 +15,7 @@ nlohmann::json to_json(const TunedModel& m) {
           {"rays", m.params.rays},
           {"relight_rays", m.params.relight_rays},
           {"max_rank", m.params.max_rank},
+          {"average", m.params.average},
           {"threshold", m.params.threshold},
           {"probes", m.probes},
           {"bytes", m.bytes},
@@ -44,9 +45,10 @@ void print(const Tuning& t) {
   const BakeParams& p = m.params;
   std::printf(
       "chosen in %s: spacing %.3g m (%llu probes), near field %.3g m, order %d, %d rays, %d relight rays, rank %d, "
-      "threshold %.3g\n",
+      "rows averaged over %.3g texels, threshold %.3g\n",
       human_seconds(t.seconds).c_str(), static_cast<double>(p.spacing), static_cast<unsigned long long>(m.probes),
-      static_cast<double>(p.near_field), p.order, p.rays, p.relight_rays, p.max_rank, static_cast<double>(p.threshold));
+      static_cast<double>(p.near_field), p.order, p.rays, p.relight_rays, p.max_rank, static_cast<double>(p.average),
+      static_cast<double>(p.threshold));
   std::printf(
       "  estimated error %.4f: bandlimit %.4f (unseen %.4f), noise %.4f, relight rays %.4f, truncation %.4f, fp16 "
       "%.5f; "

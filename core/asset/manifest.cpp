@@ -14,7 +14,7 @@ namespace lightloom {
 namespace {
 
 constexpr uint32_t kMagic = 0x4d4f4f4cu;  // "LOOM"
-constexpr uint32_t kVersion = 4;
+constexpr uint32_t kVersion = 5;
 
 struct Header {
   uint32_t magic, version;
@@ -74,8 +74,9 @@ absl::Status corrupt(std::string_view why) {
 bool valid(const BakeParams& p) {
   return p.method <= BakeMethod::kSl17 && p.probes >= 0 && p.order >= 0 && p.order <= kMaxShOrder && p.spacing > 0 &&
          std::isfinite(p.spacing) && p.near_field >= 0 && std::isfinite(p.near_field) && p.links >= 1 && p.rays >= 1 &&
-         p.relight_rays >= 1 && p.max_rank >= 0 && p.threshold >= 0 && std::isfinite(p.threshold) &&
-         p.cell_receivers >= 1 && p.texels_per_metre >= 0 && std::isfinite(p.texels_per_metre) && p.lightmap_size >= 0;
+         p.relight_rays >= 1 && p.max_rank >= 0 && p.threshold >= 0 && std::isfinite(p.threshold) && p.average >= 0 &&
+         std::isfinite(p.average) && p.cell_receivers >= 1 && p.texels_per_metre >= 0 &&
+         std::isfinite(p.texels_per_metre) && p.lightmap_size >= 0;
 }
 
 bool is_finite(const Aabb& box) { return is_finite(box.lo) && is_finite(box.hi); }

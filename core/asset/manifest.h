@@ -36,7 +36,7 @@ struct BakeParams {
   int32_t cell_receivers = 1024;  ///< a bake cell holds fewer receivers than this
   float texels_per_metre = 0;     ///< lightmap density; 0 in a request: chosen from the scene
   int32_t lightmap_size = 0;      ///< side of the scene atlas; 0: from texels_per_metre
-  uint32_t reserved = 0;
+  float average = 0;              ///< σ, texels, over which rows are averaged to choose columns by; 0: not (ADR 0009)
   uint64_t seed = 0;
 
   bool operator==(const BakeParams&) const = default;
@@ -88,7 +88,7 @@ struct CellEntry {
   uint32_t first_cluster = 0, clusters = 0;  ///< range of Manifest::clusters
   uint32_t first_probe = 0, probes = 0;      ///< range of Manifest::cell_probes
   ChunkRef chunk;
-  float error = 0;   ///< ‖T − T̃‖_F ÷ ‖T‖_F
+  float error = 0;   ///< ‖S − S̃‖_F ÷ ‖S‖_F, S of receivers as average.h has them
   float unseen = 0;  ///< share of gather rays whose hit no linked probe sees
   float stale = 0;   ///< estimated share of its light that edits since it was baked may have changed; 0: none
 };

@@ -12,6 +12,7 @@ BakeParams canary_params() {
   p.relight_rays = 256;
   p.texels_per_metre = 4;
   p.cell_receivers = 128;
+  p.average = 1;
   return p;
 }
 

@@ -127,6 +127,9 @@ absl::Status check_params(const BakeParams& p) {
   if (p.relight_rays < 1 || p.relight_rays > 1 << 20) return bad("--relight-rays must be 1 to 1048576");
   if (p.max_rank < 0 || p.max_rank > 256) return bad("--max-rank must be 0 to 256");
   if (!(p.threshold >= 0) || !std::isfinite(p.threshold)) return bad("--threshold must be ≥ 0");
+  if (!(p.average >= 0 && p.average <= 16)) return bad("--average must be 0 to 16 texels");
+  if (p.method == BakeMethod::kSl17 && p.average != 0)
+    return bad("--average goes with --method default: sl17 has none");
   if (p.cell_receivers < 16 || p.cell_receivers > 1 << 16) return bad("--cell-receivers must be 16 to 65536");
   if (!(p.texels_per_metre >= 0) || !std::isfinite(p.texels_per_metre)) return bad("--texels-per-metre must be ≥ 0");
   if (p.lightmap_size < 0 || p.lightmap_size > kMaxLightmapSide) {
@@ -145,7 +148,6 @@ absl::StatusOr<Plan> find_ground(const RayTracer& tracer, const BakeParams& requ
   const Scene& scene = tracer.scene();
   Plan plan;
   plan.params = request;
-  plan.params.reserved = 0;
 
   // Choose what the request leaves open, and record it.
   plan.params.rays = static_cast<int32_t>(well_stratified(static_cast<uint32_t>(request.rays)));

@@ -6,6 +6,7 @@
 
 #include "core/base/stopwatch.h"
 #include "core/base/version.h"
+#include "core/compression/average.h"
 #include "core/compression/clusters.h"
 #include "core/probes/links.h"
 #include "core/receivers/texel_opening.h"
@@ -206,7 +207,7 @@ absl::StatusOr<CellResult> bake_cell(const RayTracer& tracer, const Plan& plan, 
   const Stopwatch transport_watch;
   Matrix transport =
       Matrix::Zero(static_cast<Eigen::Index>(task.receivers.size()), static_cast<Eigen::Index>(task.probes.size()) * J);
-  std::vector<Vec3> positions;
+  std::vector<Vec3> positions, normals;
   TraceRecorder recorder(task.grid, task.probes.size());
   Gatherer gatherer(tracer, cache, &surfaces, {task.probes, task.probe_ids},
                     {task.params.order, task.params.rays, !sl17, task.params.near_field}, &recorder);
@@ -218,6 +219,7 @@ absl::StatusOr<CellResult> bake_cell(const RayTracer& tracer, const Plan& plan, 
     out.stats += gatherer.add_row(task.receivers[r], row);
     near.emplace_back(gatherer.near().begin(), gatherer.near().end());
     positions.push_back(task.receivers[r].point.position);
+    normals.push_back(task.receivers[r].point.normal);
     out.bounds.extend(positions.back());
   }
   out.trace = recorder.finish(task.probes);
@@ -233,7 +235,11 @@ absl::StatusOr<CellResult> bake_cell(const RayTracer& tracer, const Plan& plan, 
   if (sl17) options.probe_loss = 0;
   options.relight_rays = static_cast<uint32_t>(task.params.relight_rays);
   options.seed = task.seed;
-  CompressedCell compressed = compress_cell(transport, positions, options);
+  const bool average = task.params.average > 0;
+  const Matrix averaged = average ? average_with_neighbours(transport, positions, normals,
+                                                            task.params.average / task.params.texels_per_metre)
+                                  : Matrix();
+  CompressedCell compressed = compress_cell(transport, average ? averaged : transport, positions, options);
   out.error = compressed.error;
 
   // Keep the probes that are read.

@@ -55,12 +55,11 @@ std::vector<uint32_t> strong_probes(const Eigen::MatrixXf& energy, float share) 
 
 struct Truncated {
   std::vector<uint32_t> probes;
-  Eigen::VectorXf uniform;     // e, per receiver
-  Eigen::RowVectorXf weights;  // W
-  TruncatedSvd svd;            // of T′·W
-  Eigen::Index rank = 0;
+  Eigen::VectorXf uniform;       // e, per receiver
+  Eigen::RowVectorXf weights;    // W
+  Matrix u, sv;                  // T′·W ≈ u·sv, columns of u of unit length
   bool met = false;              // the threshold
-  double error2 = 0, norm2 = 0;  // ‖(T − T̃)W‖², ‖TW‖²
+  double error2 = 0, norm2 = 0;  // ‖(S − S̃)W‖², ‖SW‖²
 };
 
 /// Leaves weak probes out, splits off the uniform field, then truncates what is left.
@@ -68,45 +67,64 @@ struct Truncated {
 /// u: coefficients of the uniform field 1 at every probe; e = T·u: E under it. d: the row that reads the mean radiance of
 /// the probes that are kept, √(4π)/(4πP) in every DC entry, so d·u = 1. T′ = T − e·d, truncated, without what it says to u:
 /// T̃ = e·d + (U·ΣVᵀ)·(I − u·d). Whatever was left out and truncated, the uniform field lost nothing.
-Truncated truncate(const Matrix& transport, std::span<const uint32_t> rows, const CompressionOptions& o,
-                   std::span<const float> u, uint64_t seed) {
+///
+/// Which probes and which V are kept, and how many, is decided on S′ ≈ U_S·Σ_S·Vᵀ, that is T′ of averaged rows: on T′ half of
+/// V may be noise. Then U·Σ = T′·V, each receiver's own.
+Truncated truncate(const Matrix& transport, const Matrix& averaged, std::span<const uint32_t> rows,
+                   const CompressionOptions& o, std::span<const float> u, uint64_t seed) {
   const Eigen::Index J = sh_count(o.order), receivers = static_cast<Eigen::Index>(rows.size());
   const Eigen::RowVectorXf w = band_weights(o);
-  const Eigen::MatrixXf energy = energies(transport, rows, w);
+  const Eigen::MatrixXf energy = energies(averaged, rows, w);
   const double budget = double{o.threshold} * o.threshold;
   Truncated out;
   out.probes = strong_probes(energy, static_cast<float>(o.probe_loss * budget));
   const Eigen::Index probes = static_cast<Eigen::Index>(out.probes.size());
 
   const Eigen::Map<const Eigen::RowVectorXf> field(u.data(), J);
-  const Eigen::RowVectorXf everywhere = field.replicate(1, transport.cols() / J);
-  Matrix kept(receivers, probes * J);  // columns of T·W
-  out.uniform.resize(receivers);
-  for (Eigen::Index r = 0; r < receivers; ++r) {
-    const auto row = transport.row(rows[static_cast<size_t>(r)]);
-    out.uniform(r) = row.dot(everywhere);
-    for (Eigen::Index p = 0; p < probes; ++p) {
-      kept.row(r).segment(p * J, J) = row.segment(out.probes[static_cast<size_t>(p)] * J, J).cwiseProduct(w);
-    }
-  }
   Eigen::RowVectorXf d = Eigen::RowVectorXf::Zero(probes * J);  // d·W: the weight of band 0 is 1
   for (Eigen::Index p = 0; p < probes; ++p) d(p * J) = kShUniform / (4 * kPi * static_cast<float>(probes));
-
-  const Matrix rest = kept - out.uniform * d;
-  out.svd = truncated_svd(rest, o.max_rank, seed);
-  out.norm2 = energy.sum();
-  const double left_out = std::max(0.0, out.norm2 - kept.squaredNorm()), allowed = budget * out.norm2 - left_out;
+  double kept2 = 0;
+  for (const uint32_t p : out.probes) kept2 += static_cast<double>(energy.col(p).sum());
+  // T′·W of T or S.
+  const auto rest_of = [&](const Matrix& t, Eigen::VectorXf* uniform) -> Matrix {
+    const Eigen::RowVectorXf everywhere = field.replicate(1, t.cols() / J);
+    Matrix rest(receivers, probes * J);
+    uniform->resize(receivers);
+    for (Eigen::Index r = 0; r < receivers; ++r) {
+      const auto row = t.row(rows[static_cast<size_t>(r)]);
+      (*uniform)(r) = row.dot(everywhere);
+      for (Eigen::Index p = 0; p < probes; ++p) {
+        rest.row(r).segment(p * J, J) = row.segment(out.probes[static_cast<size_t>(p)] * J, J).cwiseProduct(w);
+      }
+    }
+    rest -= *uniform * d;
+    return rest;
+  };
+  const Matrix own = rest_of(transport, &out.uniform);
+  Eigen::VectorXf uniform_of_average;
+  const Matrix rest = rest_of(averaged, &uniform_of_average);
+  const TruncatedSvd svd = truncated_svd(rest, o.max_rank, seed);
+  out.norm2 = static_cast<double>(energy.sum());
+  const double left_out = std::max(0.0, out.norm2 - kept2), allowed = budget * out.norm2 - left_out;
   double tail = rest.squaredNorm();
-  while (out.rank < out.svd.sigma.size() && tail > allowed) {
-    tail -= out.svd.sigma(out.rank) * out.svd.sigma(out.rank);
-    ++out.rank;
+  Eigen::Index rank = 0;
+  while (rank < svd.sigma.size() && tail > allowed) {
+    tail -= svd.sigma(rank) * svd.sigma(rank);
+    ++rank;
   }
   out.met = tail <= allowed;
   out.weights = w.replicate(1, probes);
-  const auto factor_u = out.svd.u.leftCols(out.rank);
-  const auto factor_sv = out.svd.sv.topRows(out.rank);
-  const Eigen::VectorXf said = factor_sv * field.cwiseQuotient(w).replicate(1, probes).transpose();
-  out.error2 = left_out + (rest - factor_u * (factor_sv - said * d)).squaredNorm();
+  out.sv = svd.sv.topRows(rank);
+  const Eigen::VectorXf said = out.sv * field.cwiseQuotient(w).replicate(1, probes).transpose();
+  out.error2 = left_out + (rest - svd.u.leftCols(rank) * (out.sv - said * d)).squaredNorm();
+
+  out.u = own * out.sv.transpose();
+  for (Eigen::Index k = 0; k < rank; ++k) {
+    const float sigma2 = out.sv.row(k).squaredNorm(), length = out.u.col(k).norm();
+    if (!(length > 0)) continue;
+    out.u.col(k) /= length;
+    out.sv.row(k) *= length / sigma2;
+  }
   return out;
 }
 
@@ -118,7 +136,7 @@ uint16_t to_unorm16(float irradiance) {
 CellChunk::Cluster quantise(const Truncated& t, std::span<const uint32_t> rows, std::span<const Vec3> positions,
                             int order, std::span<const float> u) {
   const size_t J = static_cast<size_t>(sh_count(order)), stride = static_cast<size_t>(sh_stride(order));
-  const size_t probes = t.probes.size(), rank = static_cast<size_t>(t.rank);
+  const size_t probes = t.probes.size(), rank = static_cast<size_t>(t.u.cols());
   const size_t padded = (rows.size() + 7) / 8 * 8;
   CellChunk::Cluster c;
   c.receivers = static_cast<uint32_t>(rows.size());
@@ -130,15 +148,14 @@ CellChunk::Cluster quantise(const Truncated& t, std::span<const uint32_t> rows, 
     for (size_t p = 0; p < probes; ++p) {
       for (size_t j = 0; j < J; ++j) {
         const Eigen::Index column = static_cast<Eigen::Index>(p * J + j);
-        const Half h = float_to_half(t.svd.sv(static_cast<Eigen::Index>(k), column) / t.weights(column));
+        const Half h = float_to_half(t.sv(static_cast<Eigen::Index>(k), column) / t.weights(column));
         c.projection[(k * probes + p) * stride + j] = h;
         correction += static_cast<double>(half_to_float(h)) * static_cast<double>(u[j]);
       }
     }
     c.correction.push_back(static_cast<float>(correction));
     for (size_t r = 0; r < rows.size(); ++r) {
-      c.reconstruction[k * padded + r] =
-          float_to_half(t.svd.u(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(k)));
+      c.reconstruction[k * padded + r] = float_to_half(t.u(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(k)));
     }
   }
   for (const uint32_t r : rows) c.bounds.extend(positions[r]);
@@ -148,9 +165,10 @@ CellChunk::Cluster quantise(const Truncated& t, std::span<const uint32_t> rows, 
 
 }  // namespace
 
-CompressedCell compress_cell(const Matrix& transport, std::span<const Vec3> positions,
+CompressedCell compress_cell(const Matrix& transport, const Matrix& averaged, std::span<const Vec3> positions,
                              const CompressionOptions& options) {
   LL_CHECK(static_cast<size_t>(transport.rows()) == positions.size() && options.min_receivers > 0);
+  LL_CHECK(averaged.rows() == transport.rows() && averaged.cols() == transport.cols());
   const std::vector<float> u = sh_uniform(options.order, options.relight_rays);
   CompressedCell out;
   double error2 = 0, norm2 = 0;
@@ -162,7 +180,7 @@ CompressedCell compress_cell(const Matrix& transport, std::span<const Vec3> posi
   while (!stack.empty()) {
     std::vector<uint32_t> rows = std::move(stack.back());
     stack.pop_back();
-    const Truncated t = truncate(transport, rows, options, u, hash_combine(options.seed, rows.size()));
+    const Truncated t = truncate(transport, averaged, rows, options, u, hash_combine(options.seed, rows.size()));
     if (!t.met && rows.size() >= 2 * options.min_receivers) {
       // Median split along the longest axis, ties by index.
       Aabb box;

@@ -21,14 +21,15 @@ absl::Status cancelled() { return absl::CancelledError("cancelled while choosing
 
 uint64_t batch_seed(uint64_t seed, uint32_t batch) { return hash_combine(seed, kSeed + batch); }
 
-/// Mean over lights of √(error² ÷ energy): what is estimated without bias may come out below zero for one of them. It is the power
-/// mean of exponent ¼: near the geometric one, by which renderers are compared over many lights, but a zero is no harm.
+/// Mean over lights of √(error² ÷ energy). It is the power mean of exponent ¼: near the geometric one, by which renderers are
+/// compared over many lights, but a zero is no harm. What is estimated without bias may come out below zero for a light, which
+/// then does not count.
 double relative(const std::vector<double>& error2, const std::vector<double>& energy, double typical) {
   double sum = 0, weights = 0;
   for (size_t l = 0; l < energy.size(); ++l) {
-    if (!(energy[l] > 0)) continue;
+    if (!(energy[l] > 0) || error2[l] < 0) continue;
     const double weight = std::min(1.0, energy[l] / typical);
-    sum += weight * std::sqrt(std::sqrt(std::sqrt(std::max(0.0, error2[l] / energy[l]))));
+    sum += weight * std::sqrt(std::sqrt(std::sqrt(error2[l] / energy[l])));
     weights += weight;
   }
   return weights > 0 ? std::pow(sum / weights, 4) : 0;

@@ -6,6 +6,7 @@
 
 #include "core/bake/tasks.h"
 #include "core/base/half.h"
+#include "core/compression/average.h"
 #include "core/compression/clusters.h"
 
 namespace lightloom {
@@ -59,6 +60,7 @@ absl::StatusOr<SampleCells> SampleCells::create(const RayTracer& tracer, const P
                                                 const Parallel& how) {
   SampleCells out;
   out.lights_ = sample.lights().count();
+  out.average_ = plan.params.average / plan.params.texels_per_metre;
   const size_t lights = out.lights_;
   // Lights count alike, but for those that light hardly anything (as in ErrorSample).
   const double typical = sample.typical_energy();
@@ -99,7 +101,10 @@ absl::StatusOr<SampleCells> SampleCells::create(const RayTracer& tracer, const P
     for (auto& near : cell.near) near.assign(n * lights, 0);
     cell.judged.assign(n * kJudges * lights * kOrders, 0);
     cell.seed = task.seed;
-    for (const GatherPoint& r : task.receivers) cell.positions.push_back(r.point.position);
+    for (const GatherPoint& r : task.receivers) {
+      cell.positions.push_back(r.point.position);
+      cell.normals.push_back(r.point.normal);
+    }
     cell.lambda.resize(lights);
     for (size_t l = 0; l < lights; ++l) {
       for (const uint32_t id : task.probe_ids) {
@@ -172,8 +177,9 @@ absl::StatusOr<CompressionCost> SampleCells::compress(const CompressionChoice& c
     options.threshold = choice.threshold;
     options.relight_rays = static_cast<uint32_t>(choice.relight_rays);
     options.seed = cell.seed;
-    const CompressedCell compressed =
-        compress_cell(narrowed(cell.transport[of_rays], choice.order), cell.positions, options);
+    const Matrix transport = narrowed(cell.transport[of_rays], choice.order);
+    const CompressedCell compressed = compress_cell(
+        transport, average_with_neighbours(transport, cell.positions, cell.normals, average_), cell.positions, options);
     s.receivers = static_cast<double>(cell.positions.size());
     s.other = s.receivers * sizeof(uint16_t);
     for (const CellChunk::Cluster& cluster : compressed.clusters) {

@@ -41,7 +41,7 @@ class SampleCells {
   static constexpr uint32_t kBatchRays = 64, kBatches = 16, kJudges = 4;  ///< batches that judge those
 
   struct Cell {
-    std::vector<Vec3> positions;
+    std::vector<Vec3> positions, normals;
     Matrix transport[kRayCounts];            // of the widest order, by kRays
     std::vector<double> near[kRayCounts];    // E from near fields: receivers × lights, by kRays
     std::vector<float> judged;               // E: receivers × judging batches × lights × orders
@@ -50,6 +50,7 @@ class SampleCells {
   };
   std::vector<Cell> cells_;
   size_t lights_ = 0;
+  float average_ = 0;           // σ, metres, > 0
   std::vector<double> weight_;  // per light, of a squared error
 };
 

@@ -17,16 +17,19 @@ namespace {
 constexpr int kCoarsest = -6, kFinest = 6;
 constexpr uint64_t kMostProbes = 30000;
 // Shares of the target. What probes miss is dear to mend, the rest cheap; and as estimates are a little low, a tenth is left.
-constexpr double kBandlimit = 0.82, kRelight = 0.15, kCompression = 0.35;
+// Compression may have what the others leave.
+constexpr double kAll = 0.9, kBandlimit = 0.82, kRelight = 0.15, kCompression = 0.33;
 // Where it is all that can be had, the rest is to add little to it.
 constexpr double kOfBest = 0.92;
 // The knee: k times the bytes are worth k^-¼ times the error.
 constexpr double kKnee = 0.25;
 constexpr int kRelightRays[] = {512, 1024, 2048, 4096, 8192};
-// Thresholds, times the target. Looser ones also lose more of the noise: the middle one is tried first.
-constexpr double kMiddle = 0.5, kTight = 0.25, kLoose[] = {1.4, 1, 0.7};
+// Thresholds, times the error that compression may have. The middle one is tried first.
+constexpr double kMiddle = 1, kTight = 0.5, kLoose[] = {2, 1.4};
 constexpr double kFalling = 0.95;
 constexpr int kRanks[] = {32, 64};
+constexpr float kAverage = 1;
+constexpr size_t kExact = 3;                               // models that are looked at closely
 constexpr double kSurfaceBytes = 24, kNearTexelBytes = 6;  // per receiver
 constexpr double kProbeBytes = 200;                        // besides its rays
 constexpr int kTypicalOrder = 6;                           // with which compression is tried before the order is known
@@ -69,6 +72,12 @@ struct Choice {
   size_t reach = 0;
   int order = 0;
   double error = 0;
+
+  /// What noise and truncation may add to probes that miss so much.
+  double left(double bandlimit) const {
+    const double others = bandlimit * bandlimit + kRelight * kRelight * error * error;
+    return std::sqrt(std::max(kCompression * kCompression * error * error, kAll * kAll * error * error - others));
+  }
 };
 
 struct Compressed {
@@ -84,6 +93,7 @@ class Tuner {
   absl::Status prepare(BakeParams request) {
     request.spacing = 0;
     request.near_field = BakeParams::kFollows;
+    request.average = kAverage;
     LL_ASSIGN_OR_RETURN(ground_, find_ground(tracer_, request, control_));
     base_ = ground_.params.spacing;
     LL_ASSIGN_OR_RETURN(sample_, ErrorSample::create(tracer_, ground_, control_.stage("parameters: truth")));
@@ -160,7 +170,14 @@ class Tuner {
     Choice choice;
   };
 
-  /// The fewest bytes for target_.
+  /// Less is better: the fewest bytes for target_, if there is one, where missing it is as bad as at the knee; else the knee.
+  double merit_of(const TunedModel& m) const {
+    const double total = m.parts.total();
+    if (target_ > 0) return m.bytes * std::pow(std::max(1.0, total / target_), 1 / kKnee);
+    return total * std::pow(m.bytes, kKnee);
+  }
+
+  /// The best for target_.
   absl::StatusOr<Found> smallest(int step) {
     LL_ASSIGN_OR_RETURN(const Trial* at, trial(step));
     Found out;
@@ -169,10 +186,17 @@ class Tuner {
       while (order <= kMaxShOrder && at->bandlimit(reach, order) > kBandlimit * target_) ++order;
       if (order > kMaxShOrder) continue;
       const Choice choice{step, reach, order, target_};
-      LL_ASSIGN_OR_RETURN(const TunedModel m, estimate(choice));
-      if (m.bytes < out.merit) out = {m.bytes, choice};
+      LL_RETURN_IF_ERROR(consider(choice, &out));
     }
     return out;
+  }
+
+  absl::Status consider(const Choice& choice, Found* best) {
+    LL_ASSIGN_OR_RETURN(const TunedModel m, estimate(choice));
+    const Found found{merit_of(m), choice};
+    considered_.push_back(found);
+    if (found.merit < best->merit) *best = found;
+    return absl::OkStatus();
   }
 
   /// The best trade.
@@ -185,9 +209,7 @@ class Tuner {
         const double bandlimit = at->bandlimit(reach, order);
         if (bandlimit > kWorthwhile * at->best()) continue;
         const Choice choice{step, reach, order, bandlimit / kOfBest};
-        LL_ASSIGN_OR_RETURN(const TunedModel m, estimate(choice));
-        const double merit = m.parts.total() * std::pow(m.bytes, kKnee);
-        if (merit < out.merit) out = {merit, choice};
+        LL_RETURN_IF_ERROR(consider(choice, &out));
       }
     }
     return out;
@@ -202,6 +224,7 @@ class Tuner {
 
   /// Coarser spacings with higher orders, or finer ones with lower, as long as that is better.
   absl::StatusOr<Tuning> finish_best(int start, absl::StatusOr<Found> (Tuner::*best_of)(int)) {
+    considered_.clear();
     LL_ASSIGN_OR_RETURN(Found best, (this->*best_of)(start));
     for (const int direction : {-1, 1}) {
       if (direction == 1 && best.choice.step < start) break;
@@ -211,7 +234,16 @@ class Tuner {
         best = other;
       }
     }
-    return finish(best.choice);
+    // Estimates are rough: of the best of them, the one that is best in truth.
+    std::stable_sort(considered_.begin(), considered_.end(),
+                     [](const Found& a, const Found& b) { return a.merit < b.merit; });
+    considered_.resize(std::min(considered_.size(), kExact));
+    Found exact;
+    for (const Found& found : considered_) {
+      LL_ASSIGN_OR_RETURN(const TunedModel m, model(found.choice));
+      if (merit_of(m) < exact.merit) exact = {merit_of(m), found.choice};
+    }
+    return finish(exact.choice);
   }
 
   absl::StatusOr<Tuning> finish(const Choice& choice) {
@@ -246,14 +278,16 @@ class Tuner {
 
   /// All else for a choice, so that no part of the error exceeds its share.
   absl::StatusOr<TunedModel> model(const Choice& choice) {
-    LL_ASSIGN_OR_RETURN(const Compressed c, compressed(choice.step, choice.order, choice.error));
+    LL_ASSIGN_OR_RETURN(const double left, left_of(choice));
+    LL_ASSIGN_OR_RETURN(const Compressed c, compressed(choice.step, choice.order, left));
     return model(choice, c);
   }
 
   /// The same, roughly: compression as it is for a typical order, and about so large an error.
   absl::StatusOr<TunedModel> estimate(const Choice& choice) {
-    double error = 1;
-    while (error > choice.error && error > 1e-3) error /= 1.41421356;
+    LL_ASSIGN_OR_RETURN(const double left, left_of(choice));
+    double error = 0.5;
+    while (error > left && error > 1e-3) error /= 1.41421356;
     const auto key = std::pair(choice.step, error);
     if (!typical_.contains(key)) {
       LL_ASSIGN_OR_RETURN(const Compressed c, compressed(choice.step, kTypicalOrder, error));
@@ -262,6 +296,11 @@ class Tuner {
     Compressed c = typical_.at(key);
     c.cost.projection *= static_cast<double>(sh_count(choice.order)) / sh_count(kTypicalOrder);
     return model(choice, c);
+  }
+
+  absl::StatusOr<double> left_of(const Choice& choice) {
+    LL_ASSIGN_OR_RETURN(const Trial* at, trial(choice.step));
+    return choice.left(at->bandlimit(choice.reach, choice.order));
   }
 
   absl::StatusOr<TunedModel> model(const Choice& choice, const Compressed& c) {
@@ -293,8 +332,8 @@ class Tuner {
     return out;
   }
 
-  /// The lowest rank, the fewest rays and the loosest threshold whose noise and truncation together stay below their share of
-  /// `error`; the best there is if none do. The near field hardly matters, and is the plan's.
+  /// The lowest rank, the fewest rays and the loosest threshold whose noise and truncation together stay below `error`; the
+  /// best there is if none do. The near field hardly matters, and is the plan's.
   absl::StatusOr<Compressed> compressed(int step, int order, double error) {
     const Parallel how = control_.stage("parameters: rank");
     LL_RETURN_IF_ERROR(trial(step).status());
@@ -305,12 +344,12 @@ class Tuner {
     const SampleCells& cells = cells_.at(step);
     Compressed best;
     best.cost.error = kInfinity;
-    const auto enough = [&] { return best.cost.error <= kCompression * error; };
+    const auto enough = [&] { return best.cost.error <= error; };
     // Whether it is better, or enough.
     const auto attempt = [&](CompressionChoice choice, double threshold) -> absl::StatusOr<bool> {
       choice.threshold = static_cast<float>(std::clamp(threshold * error, 0.002, 0.5));
       LL_ASSIGN_OR_RETURN(const CompressionCost cost, cells.compress(choice, how));
-      if (cost.error > kCompression * error && !(cost.error < kFalling * best.cost.error)) return false;
+      if (cost.error > error && !(cost.error < kFalling * best.cost.error)) return false;
       best.choice = choice;
       best.cost = cost;
       return true;
@@ -353,7 +392,8 @@ class Tuner {
   const BakeControl& control_;
   Plan ground_;
   float base_ = 1;
-  double target_ = 0;
+  double target_ = 0;  // 0: none, or out of reach
+  std::vector<Found> considered_;
   std::unique_ptr<ErrorSample> sample_;
   std::map<int, Trial> trials_;
   std::map<int, SampleCells> cells_;

@@ -55,9 +55,9 @@ TEST(Golden, Surface) {
 TEST(Golden, Manifest) {
   const auto bytes = encode_manifest(sample_manifest());
   EXPECT_EQ(excerpt(bytes),
-            "4c4f4f4d 04000000 02000000 02000000 01000000 02000000 03000000 11000000 33333333 33333333 "
+            "4c4f4f4d 05000000 02000000 02000000 01000000 02000000 03000000 11000000 33333333 33333333 "
             "33333333 33333333 33333333 33333333 33333333 33333333");
-  EXPECT_EQ(sha256(bytes).hex(), "2103276036c2425b424105a683cfbfd142cf3d1f7902a59e9d16fc4c71f9e1ce");
+  EXPECT_EQ(sha256(bytes).hex(), "fd8bc651bdbcf9ce8c1835fdc718e53061a0fa8f6103854e48471137df999f83");
 }
 
 }  // namespace

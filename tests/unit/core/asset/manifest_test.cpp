@@ -104,9 +104,9 @@ TEST(Manifest, EveryFlippedBitIsRejected) {
 TEST(Manifest, MagicAndVersion) {
   const Bytes good = encode_manifest(sample_manifest());
   EXPECT_THAT(error_of(poke<uint32_t>(good, 0, 0)), HasSubstr("does not start with LOOM"));
-  const auto newer = decode_manifest(poke<uint32_t>(good, 4, 5));
+  const auto newer = decode_manifest(poke<uint32_t>(good, 4, 6));
   EXPECT_EQ(newer.status().code(), absl::StatusCode::kUnimplemented);
-  EXPECT_THAT(std::string(newer.status().message()), HasSubstr("version 5"));
+  EXPECT_THAT(std::string(newer.status().message()), HasSubstr("version 6"));
 }
 
 TEST(Manifest, EveryCountIsChecked) {
@@ -143,6 +143,8 @@ TEST(Manifest, FieldsOutOfRangeAreRejected) {
       {"spacing", [](Manifest& m) { m.params.spacing = kInf; }},
       {"near field", [](Manifest& m) { m.params.near_field = -1; }},
       {"near field", [](Manifest& m) { m.params.near_field = kNan; }},
+      {"average", [](Manifest& m) { m.params.average = -1; }},
+      {"average", [](Manifest& m) { m.params.average = kNan; }},
       {"links", [](Manifest& m) { m.params.links = 0; }},
       {"rays", [](Manifest& m) { m.params.rays = 0; }},
       {"relight rays", [](Manifest& m) { m.params.relight_rays = 0; }},

@@ -92,6 +92,7 @@ Manifest sample_manifest() {
   m.params.rays = 64;
   m.params.relight_rays = 8;
   m.params.max_rank = 4;
+  m.params.average = 1.5f;
   m.params.threshold = 0.125f;
   m.params.cell_receivers = 512;
   m.params.texels_per_metre = 4;

@@ -200,6 +200,12 @@ TEST(Bake, RefusesWhatItCannotBake) {
   bad.near_field = 1;
   EXPECT_THAT(error(test::room_with_crate(), bad), HasSubstr("sl17"));
   bad = small();
+  bad.average = -1;
+  EXPECT_THAT(error(test::room_with_crate(), bad), HasSubstr("--average"));
+  bad = sl17_params();
+  bad.average = 1;
+  EXPECT_THAT(error(test::room_with_crate(), bad), HasSubstr("sl17"));
+  bad = small();
   bad.rays = 0;
   EXPECT_THAT(error(test::room_with_crate(), bad), HasSubstr("--rays"));
   Scene none = test::room_with_crate();

@@ -83,7 +83,7 @@ TEST(TaskBlobs, PayloadRefusesBadParametersAndOtherMethods) {
   EXPECT_THAT(error(with(bytes, 48, std::numeric_limits<float>::quiet_NaN())), HasSubstr("payload: --spacing"));
   EXPECT_THAT(error(with(bytes, 52, -2.0f)), HasSubstr("payload: --near-field"));
   EXPECT_THAT(error(with(bytes, 64, -1)), HasSubstr("payload: --rays"));
-  EXPECT_THAT(error(with(bytes, 112, '\n')), HasSubstr("asks for method '\\n'"));
+  EXPECT_THAT(error(with(bytes, 112, '\n')), HasSubstr("asks for method '\\n"));
   EXPECT_THAT(error(with(bytes, 104, 0u)), HasSubstr("length"));
   EXPECT_THAT(error(with(bytes, 104, 0xffffffffu)), HasSubstr("length"));
   EXPECT_THAT(error({}), HasSubstr("payload is corrupt"));

@@ -65,6 +65,10 @@ CompressionOptions options(int max_rank, float threshold, uint32_t min_receivers
   return o;
 }
 
+CompressedCell compress(const Level& level, const CompressionOptions& options) {
+  return compress_cell(level.transport, level.transport, level.positions, options);
+}
+
 /// As decode_cluster over the whole cell, in the order of the rows of T.
 std::vector<float> decode(const CompressedCell& cell, const std::vector<float>& lambda) {
   std::vector<float> e(cell.order.size());
@@ -100,7 +104,7 @@ constexpr double kRounding = 2e-3;
 TEST(CompressCell, MeasuredErrorIsTheReportedOne) {
   for (const int rank : {0, 1, 4, 8, 32}) {
     const Level level = strip(150, 6, 0.3f, 1);
-    const CompressedCell cell = compress_cell(level.transport, level.positions, options(rank, 0.02f));
+    const CompressedCell cell = compress(level, options(rank, 0.02f));
     ASSERT_EQ(cell.clusters.size(), 1u);
     EXPECT_LE(cell.clusters[0].rank(), static_cast<uint32_t>(rank));
     const double measured = measured_error(level, cell);
@@ -113,7 +117,7 @@ TEST(CompressCell, TheThresholdEndsTheRank) {
   const Level level = strip(150, 6, 0.3f, 2);
   uint32_t previous = 0;
   for (const float threshold : {0.5f, 0.2f, 0.1f, 0.05f}) {
-    const CompressedCell cell = compress_cell(level.transport, level.positions, options(96, threshold));
+    const CompressedCell cell = compress(level, options(96, threshold));
     EXPECT_LE(cell.error, threshold);
     EXPECT_GE(cell.clusters[0].rank(), previous) << threshold;
     previous = cell.clusters[0].rank();
@@ -124,7 +128,7 @@ TEST(CompressCell, TheThresholdEndsTheRank) {
 TEST(CompressCell, RandomLightErrsWithinTheBound) {
   // |(T − T̃)·λ| ≤ ‖(T − T̃)W‖·|W⁻¹λ| by Cauchy and Schwarz, over all receivers.
   const Level level = strip(150, 6, 0.3f, 3);
-  const CompressedCell cell = compress_cell(level.transport, level.positions, options(8, 0.02f));
+  const CompressedCell cell = compress(level, options(8, 0.02f));
   Matrix weighted = level.transport;
   for (Index column = 0; column < weighted.cols(); ++column) {
     weighted.col(column) /= static_cast<float>(1 + static_cast<int>(std::sqrt(static_cast<double>(column % kJ))));
@@ -152,7 +156,7 @@ TEST(CompressCell, UniformFieldIsExactAtEveryRank) {
   for (const int rank : {0, 1, 8, 32}) {
     for (const uint32_t min_receivers : {20u, 1u << 30}) {
       const Level level = strip(200, 8, 1.0f, 5);
-      const CompressedCell cell = compress_cell(level.transport, level.positions, options(rank, 0.001f, min_receivers));
+      const CompressedCell cell = compress(level, options(rank, 0.001f, min_receivers));
       std::vector<float> uniform(static_cast<size_t>(level.transport.cols()), 0);
       for (Index p = 0; p < level.probes(); ++p) uniform[static_cast<size_t>(p * kJ)] = kShUniform;
       const std::vector<float> e = decode(cell, uniform);
@@ -174,7 +178,7 @@ TEST(CompressCell, UniformFieldNeverExceedsPi) {
   // stable.
   Level level = strip(60, 4, 0.3f, 6);
   for (Index p = 0; p < level.probes(); ++p) level.transport.col(p * kJ) *= 1.2f;
-  const CompressedCell cell = compress_cell(level.transport, level.positions, options(8, 0.01f));
+  const CompressedCell cell = compress(level, options(8, 0.01f));
   std::vector<float> uniform(static_cast<size_t>(level.transport.cols()), 0);
   for (Index p = 0; p < level.probes(); ++p) uniform[static_cast<size_t>(p * kJ)] = kShUniform;
   float brightest = 0;
@@ -186,7 +190,7 @@ TEST(CompressCell, UniformFieldNeverExceedsPi) {
 TEST(CompressCell, SameInputSameBytes) {
   const Level level = strip(300, 8, 0.5f, 7);
   const auto bytes = [&] {
-    const CompressedCell cell = compress_cell(level.transport, level.positions, options(8, 0.01f, 40));
+    const CompressedCell cell = compress(level, options(8, 0.01f, 40));
     CellChunk chunk;
     chunk.order = kOrder;
     chunk.probe_count = static_cast<uint32_t>(level.probes());
@@ -205,7 +209,7 @@ TEST(CompressCell, SameInputSameBytes) {
 TEST(CompressCell, ClustersCoverAllReceiversOnceAndHonourTheirMinimum) {
   const Level level = strip(500, 10, 2.0f, 8);
   for (const uint32_t min_receivers : {1u, 30u, 100u, 250u, 251u}) {
-    const CompressedCell cell = compress_cell(level.transport, level.positions, options(2, 0.001f, min_receivers));
+    const CompressedCell cell = compress(level, options(2, 0.001f, min_receivers));
     uint32_t next = 0;
     for (const CellChunk::Cluster& c : cell.clusters) {
       EXPECT_EQ(c.first_receiver, next);
@@ -237,12 +241,12 @@ TEST(CompressCell, ClustersCoverAllReceiversOnceAndHonourTheirMinimum) {
 
 TEST(CompressCell, SplitsOnlyWhatIsAboveTheThreshold) {
   const Level level = strip(200, 8, 0, 9);
-  EXPECT_EQ(compress_cell(level.transport, level.positions, options(32, 0.9f, 10)).clusters.size(), 1u);
+  EXPECT_EQ(compress(level, options(32, 0.9f, 10)).clusters.size(), 1u);
 }
 
 TEST(CompressCell, ClustersKeepOnlyTheProbesTheyUse) {
   const Level level = strip(200, 10, 0.5f, 10);
-  const CompressedCell cell = compress_cell(level.transport, level.positions, options(2, 0.001f, 50));
+  const CompressedCell cell = compress(level, options(2, 0.001f, 50));
   ASSERT_EQ(cell.clusters.size(), 4u);
   for (const CellChunk::Cluster& c : cell.clusters) {
     std::vector<uint32_t> used;
@@ -266,18 +270,18 @@ TEST(CompressCell, ProbesThatSayLittleAreLeftOut) {
   level.transport.block(1, 2 * kJ, 199, kJ) *= 1e-3f;
   level.transport.block(0, 2 * kJ, 1, kJ) = level.transport.block(0, 0, 1, kJ);
   CompressionOptions o = options(64, 0.02f);
-  const CompressedCell cell = compress_cell(level.transport, level.positions, o);
+  const CompressedCell cell = compress(level, o);
   ASSERT_EQ(cell.clusters.size(), 1u);
   EXPECT_EQ(cell.clusters[0].probes, (std::vector<uint32_t>{0, 2})) << "one receiver needs probe 2";
   EXPECT_LE(cell.error, 0.0201);
   o.probe_loss = 0;
-  EXPECT_EQ(compress_cell(level.transport, level.positions, o).clusters[0].probes, (std::vector<uint32_t>{0, 1, 2}));
+  EXPECT_EQ(compress(level, o).clusters[0].probes, (std::vector<uint32_t>{0, 1, 2}));
 }
 
 TEST(CompressCell, PaddingIsZero) {
   const Level level = strip(13, 3, 0.5f, 11);
   CompressionOptions o = options(4, 0.001f);
-  const CompressedCell cell = compress_cell(level.transport, level.positions, o);
+  const CompressedCell cell = compress(level, o);
   const CellChunk::Cluster& c = cell.clusters.at(0);
   ASSERT_EQ(c.rank(), 4u);
   ASSERT_EQ(c.reconstruction.size(), 4u * 16);
@@ -287,7 +291,7 @@ TEST(CompressCell, PaddingIsZero) {
   // J = 9 of 16 at order 2.
   o.order = 2;
   const Matrix t = level.transport.leftCols(27);
-  const CompressedCell other = compress_cell(t, level.positions, o);
+  const CompressedCell other = compress_cell(t, t, level.positions, o);
   const CellChunk::Cluster& d = other.clusters.at(0);
   ASSERT_EQ(d.projection.size(), d.rank() * d.probes.size() * 16);
   for (size_t i = 0; i < d.projection.size(); ++i) {
@@ -299,7 +303,7 @@ TEST(CompressCell, PaddingIsZero) {
 
 TEST(CompressCell, PrefixesOfTheColumnsAreCoarserClusters) {
   const Level level = strip(150, 6, 0.5f, 12);
-  CompressedCell cell = compress_cell(level.transport, level.positions, options(16, 0.001f));
+  CompressedCell cell = compress(level, options(16, 0.001f));
   CellChunk::Cluster& c = cell.clusters.at(0);
   ASSERT_EQ(c.rank(), 16u);
   const size_t row = c.probes.size() * static_cast<size_t>(sh_stride(kOrder)), column = (c.receivers + 7) / 8 * 8;
@@ -326,7 +330,7 @@ TEST(CompressCell, PrefixesOfTheColumnsAreCoarserClusters) {
 }
 
 TEST(CompressCell, NothingGivesNothing) {
-  const CompressedCell none = compress_cell(Matrix(0, 2 * kJ), {}, options(8, 0.05f));
+  const CompressedCell none = compress_cell(Matrix(0, 2 * kJ), Matrix(0, 2 * kJ), {}, options(8, 0.05f));
   EXPECT_TRUE(none.clusters.empty());
   EXPECT_EQ(none.error, 0);
 }
@@ -334,7 +338,7 @@ TEST(CompressCell, NothingGivesNothing) {
 TEST(CompressCell, ReceiversWithoutTransportAreDark) {
   const Matrix zero = Matrix::Zero(3, 2 * kJ);
   const std::vector<Vec3> positions(3);
-  const CompressedCell cell = compress_cell(zero, positions, options(8, 0.05f, 1));
+  const CompressedCell cell = compress_cell(zero, zero, positions, options(8, 0.05f, 1));
   ASSERT_EQ(cell.clusters.size(), 1u);
   EXPECT_EQ(cell.clusters[0].rank(), 0u);
   EXPECT_TRUE(cell.clusters[0].probes.empty());
@@ -344,7 +348,7 @@ TEST(CompressCell, ReceiversWithoutTransportAreDark) {
 
 TEST(CompressCell, ASingleReceiverIsExactToRounding) {
   const Level level = strip(1, 3, 0.5f, 13);
-  const CompressedCell cell = compress_cell(level.transport, level.positions, options(8, 0.001f));
+  const CompressedCell cell = compress(level, options(8, 0.001f));
   ASSERT_EQ(cell.clusters.size(), 1u);
   EXPECT_EQ(cell.clusters[0].rank(), 1u);
   EXPECT_LT(measured_error(level, cell), kRounding);
