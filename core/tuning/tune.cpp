@@ -28,7 +28,8 @@ constexpr int kRelightRays[] = {512, 1024, 2048, 4096, 8192};
 constexpr double kMiddle = 1, kTight = 0.5, kLoose[] = {2, 1.4};
 constexpr double kFalling = 0.95;
 constexpr int kRanks[] = {32, 64};
-constexpr float kAverage = 1;
+constexpr double kOfBudget = 0.95;                         // few cells tell how well a level compresses
+constexpr float kAverage = 1;                              // texels
 constexpr size_t kExact = 3;                               // models that are looked at closely
 constexpr double kSurfaceBytes = 24, kNearTexelBytes = 6;  // per receiver
 constexpr double kProbeBytes = 200;                        // besides its rays
@@ -117,7 +118,7 @@ class Tuner {
   }
 
   absl::StatusOr<Tuning> for_bytes(uint64_t bytes) {
-    const auto most = static_cast<double>(bytes);
+    const double most = kOfBudget * static_cast<double>(bytes);
     struct Fitting {
       Choice choice;
       double total, bytes;  // as estimated
