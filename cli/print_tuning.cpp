@@ -45,7 +45,7 @@ void print(const Tuning& t) {
   const BakeParams& p = m.params;
   std::printf(
       "chosen in %s: spacing %.3g m (%llu probes), near field %.3g m, order %d, %d rays, %d relight rays, rank %d, "
-      "rows averaged over %.3g texels, threshold %.3g\n",
+      "average %.3g texels, threshold %.3g\n",
       human_seconds(t.seconds).c_str(), static_cast<double>(p.spacing), static_cast<unsigned long long>(m.probes),
       static_cast<double>(p.near_field), p.order, p.rays, p.relight_rays, p.max_rank, static_cast<double>(p.average),
       static_cast<double>(p.threshold));
