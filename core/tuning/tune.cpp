@@ -152,10 +152,13 @@ class Tuner {
     double above = 1;  // how far estimates have been too low
     for (const Fitting& f : fitting) {
       if (f.bytes * above > most) continue;
-      LL_ASSIGN_OR_RETURN(Tuning out, finish(f.choice));
-      out.met = out.chosen.bytes <= most;
-      if (out.met) return out;
-      above = std::max(above, out.chosen.bytes / f.bytes);
+      LL_ASSIGN_OR_RETURN(const TunedModel m, model(f.choice));
+      if (m.bytes <= most) {
+        LL_ASSIGN_OR_RETURN(Tuning out, finish(f.choice, m));
+        out.met = true;
+        return out;
+      }
+      above = std::max(above, m.bytes / f.bytes);
     }
     return absl::InvalidArgumentError("--budget is too small: the least model of this level takes about " +
                                       std::to_string(static_cast<uint64_t>(least)) +
@@ -240,16 +243,20 @@ class Tuner {
                      [](const Found& a, const Found& b) { return a.merit < b.merit; });
     considered_.resize(std::min(considered_.size(), kExact));
     Found exact;
+    TunedModel chosen;
     for (const Found& found : considered_) {
       LL_ASSIGN_OR_RETURN(const TunedModel m, model(found.choice));
-      if (merit_of(m) < exact.merit) exact = {merit_of(m), found.choice};
+      const double merit = merit_of(m);
+      if (merit >= exact.merit) continue;
+      exact = {merit, found.choice};
+      chosen = m;
     }
-    return finish(exact.choice);
+    return finish(exact.choice, chosen);
   }
 
-  absl::StatusOr<Tuning> finish(const Choice& choice) {
+  absl::StatusOr<Tuning> finish(const Choice& choice, const TunedModel& chosen) {
     Tuning out;
-    LL_ASSIGN_OR_RETURN(out.chosen, model(choice));
+    out.chosen = chosen;
     Choice next = choice;
     ++next.step;
     if (!can_go(next.step)) return out;
