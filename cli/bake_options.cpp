@@ -45,7 +45,6 @@ std::string BakeOptions::fixed() const {
   if (near_field_) return "--near-field";
   if (order_) return "--order";
   if (probes_) return "--probes";
-  if (links_) return "--links";
   if (rays_) return "--rays";
   if (relight_rays_) return "--relight-rays";
   if (max_rank_) return "--max-rank";
@@ -54,7 +53,8 @@ std::string BakeOptions::fixed() const {
 }
 
 std::optional<TuneTarget> BakeOptions::target(const BakeParams* earlier) const {
-  if (earlier != nullptr && !retune_) return std::nullopt;
+  const bool same_method = earlier != nullptr && (method_.empty() || earlier->method == BakeMethod::kDefault);
+  if (same_method && !retune_) return std::nullopt;
   if (budget_ > 0) return TuneTarget{0, budget_};
   if (!error_ && !retune_ && !fixed().empty()) return std::nullopt;
   return TuneTarget{static_cast<double>(error_.value_or(kDefaultError)), 0};
@@ -65,7 +65,7 @@ absl::StatusOr<BakeParams> BakeOptions::tuned(const RayTracer& tracer, const Bak
   BakeParams p = params(earlier);
   const std::optional<TuneTarget> for_what = target(earlier);
   if (!for_what) {
-    if (earlier != nullptr && (error_ || budget_ > 0)) {
+    if (error_ || budget_ > 0) {
       std::fprintf(stderr, "lightloom: the parameters of the earlier bake are kept; --retune chooses anew\n");
     }
     return p;
@@ -82,7 +82,13 @@ absl::StatusOr<BakeParams> BakeOptions::tuned(const RayTracer& tracer, const Bak
 
 BakeParams BakeOptions::params(const BakeParams* earlier) const {
   BakeParams p = method_ == "sl17" ? sl17_params() : BakeParams{};
-  if (earlier != nullptr && (method_.empty() || earlier->method == p.method)) p = *earlier;
+  if (earlier != nullptr && (method_.empty() || earlier->method == p.method)) {
+    p = *earlier;
+  } else if (earlier != nullptr) {  // another method: only what is no matter of it
+    p.texels_per_metre = earlier->texels_per_metre;
+    p.lightmap_size = earlier->lightmap_size;
+    p.seed = earlier->seed;
+  }
   const auto set = [](auto* value, const auto& given) {
     if (given) *value = *given;
   };

@@ -65,7 +65,13 @@ absl::Status check(const Options& o) {
   const auto bad = [](const std::string& what) { return absl::InvalidArgumentError(what); };
   if (!o.pool.empty()) {
     if (!o.scene.empty() || !o.lights.empty()) return bad("--pool goes without SCENE and --lights: leave them out");
-    for (const std::string& folder : o.pool) LL_RETURN_IF_ERROR(check_input(folder + "/evaluation.json"));
+    for (const std::string& folder : o.pool) {
+      LL_RETURN_IF_ERROR(check_input(folder + "/evaluation.json"));
+      std::error_code unknown;
+      if (std::filesystem::equivalent(folder, o.output, unknown)) {
+        return bad("-o is a folder of --pool, whose report it would replace: give another one");
+      }
+    }
     return OutputCheck(o.pool).file("-o", o.output + "/report.html", {".html"});
   }
   if (o.scene.empty()) return bad("SCENE is required, or --pool");

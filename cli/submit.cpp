@@ -12,6 +12,7 @@
 #include "cli/interrupt.h"
 #include "cli/level.h"
 #include "cli/print_json.h"
+#include "cli/print_tuning.h"
 #include "cli/progress.h"
 
 namespace lightloom {
@@ -50,9 +51,11 @@ absl::Status run(const Options& o) {
   };
   FarmClient farm = o.farm->connect();
   LL_RETURN_IF_ERROR(farm.check_server());  // before time is spent on parameters
+  std::optional<Tuning> tuning;
   LL_ASSIGN_OR_RETURN(const BakeParams params,
-                      o.how.tuned(*level.tracer, earlier ? &earlier->manifest.params : nullptr, control, nullptr));
+                      o.how.tuned(*level.tracer, earlier ? &earlier->manifest.params : nullptr, control, &tuning));
   bar.finish();
+  if (tuning && !o.farm->json) print(*tuning);
   LL_ASSIGN_OR_RETURN(const RemoteJob job,
                       submit_level(&farm, o.scene, params, earlier ? &*earlier : nullptr, o.name, o.priority));
   if (o.farm->json) {

@@ -4,6 +4,7 @@
 #include <string>
 #include <utility>
 
+#include "core/asset/texel_codes.h"
 #include "core/base/text.h"
 
 namespace lightloom {
@@ -252,14 +253,11 @@ absl::StatusOr<std::vector<uint32_t>> AssetIndex::near_elements(const CellChunk&
 
 bool AssetIndex::to_elements(const std::vector<ChunkObject>& named, std::span<const uint32_t> objects,
                              std::span<const SurfaceKeys> keys, std::vector<uint32_t>* texels) const {
-  // First code of each object, then of none.
-  std::vector<uint64_t> base = {0};
-  for (const ChunkObject& o : named) base.push_back(base.back() + 2ull * o.width * o.height);
+  const TexelCodes codes(named);
   for (uint32_t& texel : *texels) {
     if (texel == RelightChunk::kDead || texel == RelightChunk::kSky) continue;
-    const auto after = std::upper_bound(base.begin(), base.end(), texel);
-    const size_t slot = static_cast<size_t>(after - base.begin()) - 1;
-    const size_t at = find_key(*keys[slot], static_cast<uint32_t>(texel - base[slot]));
+    const auto [slot, key] = codes.texel(texel);
+    const size_t at = find_key(*keys[slot], key);
     if (at == keys[slot]->size()) return false;
     texel = objects_[objects[slot]].first_element + static_cast<uint32_t>(at);
   }

@@ -137,6 +137,7 @@ absl::StatusOr<CellBlock> make_cell_block(const SourceCell& cell, uint64_t max_b
     block.projection_bytes += c.projection.size() * sizeof(Half);
     block.reconstruction_bytes += c.reconstruction.size() * sizeof(Half);
   }
+  block.reconstruction_bytes += cell.near_elements.size() * kNearTexelBytes;
   return block;
 }
 

@@ -15,7 +15,7 @@ struct CellBlock {
   uint64_t bytes = 0;         ///< of the block, the coefficients that the project pass writes included
   uint64_t upload_bytes = 0;  ///< of `data`, without them
   uint32_t jobs = 0, octets = 0;
-  uint64_t projection_bytes = 0, reconstruction_bytes = 0;
+  uint64_t projection_bytes = 0, reconstruction_bytes = 0;  ///< in the asset; near fields, too
   std::pmr::vector<uint8_t> data;
 };
 

@@ -62,6 +62,8 @@ class Preparation {
   }
 
   absl::StatusOr<Plan> plan(const BakeParams& params) { return make_plan(level_.tracer(), params, control_); }
+  /// Without probes, for a method that places its own.
+  absl::StatusOr<Plan> ground(const BakeParams& params) { return find_ground(level_.tracer(), params, control_); }
   const BakeControl& control() const { return control_; }
 
   std::unique_ptr<Model> model(const Plan& plan, std::unique_ptr<Baseline> baseline) const {
@@ -150,7 +152,7 @@ class DdgiMethod : public Method {
     Preparation preparation(level);
     BakeParams params = level->plan().params;
     params.relight_rays = static_cast<int32_t>(settings.at("relight_rays"));
-    LL_ASSIGN_OR_RETURN(const Plan plan, preparation.plan(params));
+    LL_ASSIGN_OR_RETURN(const Plan plan, preparation.ground(params));
     DdgiParams ddgi;
     ddgi.spacing = static_cast<float>(settings.at("spacing"));
     ddgi.bias = static_cast<float>(settings.at("bias"));

@@ -58,7 +58,8 @@ bool lightmaps_missing(const Request& request, const Method& method, size_t rigs
 
 /// One round: prepares the variant once more, and the first time lights and judges it.
 absl::Status measure(LitLevel* level, const Request& request, const Method& method, const Variant& variant,
-                     const std::vector<Truth>& truths, bool keep_lightmaps, Run* run) {
+                     const std::vector<Truth>& truths, bool keep_lightmaps,
+                     const std::filesystem::path& path, Run* run) {
   const std::filesystem::path scratch = std::filesystem::path(request.folder) / ("scratch-" + random_id());
   struct Remove {
     const std::filesystem::path& path;
@@ -71,6 +72,8 @@ absl::Status measure(LitLevel* level, const Request& request, const Method& meth
   LL_RETURN_IF_ERROR(not_interrupted());
 
   if (run->rigs.empty()) {
+    std::error_code none;
+    std::filesystem::remove(path, none);  // its lightmaps go one by one: those of two runs must not pass for one's
     for (size_t i = 0; i < level->rigs(); ++i) {
       LL_ASSIGN_OR_RETURN(const Image e, model->light(i, request.bounces));
       LL_RETURN_IF_ERROR(not_interrupted());
@@ -151,7 +154,7 @@ absl::StatusOr<Evaluation> evaluate(LitLevel* level, const std::string& name, co
     for (size_t i = 0; i < jobs.size(); ++i) {
       Job& job = jobs[i];
       if (job.run.seconds.size() > round) continue;
-      LL_RETURN_IF_ERROR(measure(level, request, *job.method, job.variant, truths, job.first, &job.run));
+      LL_RETURN_IF_ERROR(measure(level, request, *job.method, job.variant, truths, job.first, job.path, &job.run));
       LL_RETURN_IF_ERROR(save(job.run, job.path));
       level->bar()->finish();
       std::fprintf(stderr, "%zu of %zu: %s, %s: error %.4f, %.1f s, %s, %.2f ms a frame\n", i + 1, jobs.size(),

@@ -71,6 +71,7 @@ absl::StatusOr<ExpectedError> expected_error(LitLevel* level, const std::vector<
   double noise2 = 0, error2 = 0;
   for (size_t rig = 0; rig < truths.size(); ++rig) {
     const Image& truth = truths[rig].image;
+    LL_ASSIGN_OR_RETURN(const Comparison c, compare(lightmaps[rig], truth, {}));  // of one size, or an error
     const double scale = mean_over_area(truth) * static_cast<double>(truths.size());
     for (size_t i = 0; i < sample.size(); ++i) {
       const auto [x, y] = pixel_of(level->elements(), plan.receivers.all[sample[i]]);
@@ -80,7 +81,6 @@ absl::StatusOr<ExpectedError> expected_error(LitLevel* level, const std::vector<
       out.own_error[i] += error;
       e[i] += mean(truth.rgb(x, y));
     }
-    LL_ASSIGN_OR_RETURN(const Comparison c, compare(lightmaps[rig], truth, {}));
     noise2 += truths[rig].noise * truths[rig].noise;
     error2 += c.rel_rmse * c.rel_rmse;
   }

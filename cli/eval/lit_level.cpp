@@ -152,6 +152,8 @@ absl::StatusOr<Truth> LitLevel::truth(size_t rig, const TruthOptions& o, const s
   const Image receivers = lightmap_image(elements_, std::vector<Vec3>(elements_.receivers.all.size()));
   std::vector<float>& valid = *truth.image.channel("A");
   for (size_t i = 0; i < valid.size(); ++i) valid[i] = std::min(valid[i], (*receivers.channel("A"))[i]);
+  std::error_code none;
+  std::filesystem::remove(facts, none);  // it speaks of the image before
   LL_RETURN_IF_ERROR(write_exr(truth.image, image));
   LL_RETURN_IF_ERROR(write_file_atomic(
       facts,

@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <string>
+#include <vector>
 
+#include "core/asset/texel_codes.h"
 #include "core/base/file.h"
 #include "core/base/text.h"
 
@@ -18,18 +21,50 @@ absl::Status in_context(const absl::Status& status, const std::string& what) {
   return absl::Status(status.code(), what + ": " + std::string(status.message()));
 }
 
+/// An object, and the texels that its surface chunk has.
+struct Surface {
+  const ObjectEntry* object = nullptr;
+  std::vector<uint32_t> keys;  // ascending
+  std::vector<bool> lit;       // per key: it is a receiver of some cell
+};
+using Surfaces = std::map<Digest, Surface>;
+
 /// Chunks may only name objects of the manifest, with the lightmap size it gives them.
-absl::Status check_object(const std::map<Digest, const ObjectEntry*>& objects, const ChunkObject& o,
-                          const std::string& what) {
-  const auto it = objects.find(o.id);
-  if (it == objects.end() || it->second->width != static_cast<int32_t>(o.width) ||
-      it->second->height != static_cast<int32_t>(o.height)) {
-    return mismatch(what + ": object " + o.id.hex().substr(0, 12));
+absl::StatusOr<std::vector<Surface*>> find_objects(const std::vector<ChunkObject>& named, const std::string& what,
+                                                   Surfaces* surfaces) {
+  std::vector<Surface*> found;
+  for (const ChunkObject& o : named) {
+    const auto it = surfaces->find(o.id);
+    if (it == surfaces->end() || it->second.object->width != static_cast<int32_t>(o.width) ||
+        it->second.object->height != static_cast<int32_t>(o.height)) {
+      return mismatch(what + ": object " + o.id.hex().substr(0, 12));
+    }
+    found.push_back(&it->second);
+  }
+  return found;
+}
+
+/// Index into the surface's keys; none if it has no such texel.
+std::optional<size_t> find_texel(const std::vector<Surface*>& objects, TexelRef texel) {
+  const std::vector<uint32_t>& keys = objects[texel.slot]->keys;
+  const auto it = std::lower_bound(keys.begin(), keys.end(), texel.key);
+  if (it == keys.end() || *it != texel.key) return std::nullopt;
+  return static_cast<size_t>(it - keys.begin());
+}
+
+/// Codes may only name texels that their object's surface has.
+absl::Status check_codes(const std::vector<ChunkObject>& named, const std::vector<uint32_t>& texels,
+                         const std::vector<Surface*>& objects, const std::string& what) {
+  const TexelCodes codes(named);
+  for (const uint32_t code : texels) {
+    if (code == RelightChunk::kDead || code == RelightChunk::kSky) continue;
+    if (!find_texel(objects, codes.texel(code))) return mismatch(what + ": a texel that no surface has");
   }
   return absl::OkStatus();
 }
 
-absl::Status verify_cell(const Manifest& m, const CellEntry& entry, const CellChunk& chunk, const std::string& what) {
+absl::Status verify_cell(const Manifest& m, const CellEntry& entry, const CellChunk& chunk, const std::string& what,
+                         Surfaces* surfaces) {
   if (chunk.order != static_cast<uint32_t>(m.params.order) || chunk.probe_count != entry.probes ||
       chunk.receivers.size() != entry.receivers || chunk.clusters.size() != entry.clusters) {
     return mismatch(what);
@@ -41,7 +76,15 @@ absl::Status verify_cell(const Manifest& m, const CellEntry& entry, const CellCh
       return mismatch(what + ": cluster " + std::to_string(i));
     }
   }
-  return absl::OkStatus();
+  LL_ASSIGN_OR_RETURN(const std::vector<Surface*> objects, find_objects(chunk.objects, what, surfaces));
+  for (const TexelRef& receiver : chunk.receivers) {
+    const auto texel = find_texel(objects, receiver);
+    if (!texel) return mismatch(what + ": a receiver that no surface has");
+    auto lit = objects[receiver.slot]->lit.begin() + static_cast<std::ptrdiff_t>(*texel);
+    if (*lit) return mismatch(what + ": a receiver that is there twice");
+    *lit = true;
+  }
+  return check_codes(chunk.objects, chunk.near_texels, objects, what);
 }
 
 constexpr std::string_view kTraces = "traces-";
@@ -129,8 +172,8 @@ absl::Status verify_asset(const std::filesystem::path& loom) {
   LL_ASSIGN_OR_RETURN(const Manifest m, read_manifest(loom));
   const ChunkStore store = chunk_store(loom);
 
-  std::map<Digest, const ObjectEntry*> objects;
-  for (const ObjectEntry& o : m.objects) objects[o.id] = &o;
+  Surfaces surfaces;
+  for (const ObjectEntry& o : m.objects) surfaces[o.id].object = &o;
 
   for (const ObjectEntry& o : m.objects) {
     if (o.surface.size == 0) continue;
@@ -139,7 +182,9 @@ absl::Status verify_asset(const std::filesystem::path& loom) {
     const auto chunk = decode_surface(bytes);
     if (!chunk.ok()) return in_context(chunk.status(), what);
     if (chunk->object.id != o.id) return mismatch(what);
-    LL_RETURN_IF_ERROR(check_object(objects, chunk->object, what));
+    LL_RETURN_IF_ERROR(find_objects({chunk->object}, what, &surfaces).status());
+    surfaces[o.id].keys = chunk->keys;
+    surfaces[o.id].lit.resize(chunk->keys.size());
   }
   for (size_t i = 0; i < m.probes.size(); ++i) {
     const std::string what = "relight set of probe " + std::to_string(i);
@@ -149,15 +194,15 @@ absl::Status verify_asset(const std::filesystem::path& loom) {
     if (chunk->rays.size() != static_cast<size_t>(m.params.relight_rays) || chunk->position != m.probes[i].position) {
       return mismatch(what);
     }
-    for (const ChunkObject& o : chunk->objects) LL_RETURN_IF_ERROR(check_object(objects, o, what));
+    LL_ASSIGN_OR_RETURN(const std::vector<Surface*> objects, find_objects(chunk->objects, what, &surfaces));
+    LL_RETURN_IF_ERROR(check_codes(chunk->objects, chunk->rays, objects, what));
   }
   for (size_t i = 0; i < m.cells.size(); ++i) {
     const std::string what = "cell " + std::to_string(i);
     LL_ASSIGN_OR_RETURN(const auto bytes, store.get(m.cells[i].chunk));
     const auto chunk = decode_cell(bytes);
     if (!chunk.ok()) return in_context(chunk.status(), what);
-    LL_RETURN_IF_ERROR(verify_cell(m, m.cells[i], *chunk, what));
-    for (const ChunkObject& o : chunk->objects) LL_RETURN_IF_ERROR(check_object(objects, o, what));
+    LL_RETURN_IF_ERROR(verify_cell(m, m.cells[i], *chunk, what, &surfaces));
   }
   if (const auto traces = read_traces(loom, m); !traces.ok() && !absl::IsNotFound(traces.status())) {
     return traces.status();

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/asset/texel_codes.h"
 #include "core/base/bytes.h"
 #include "core/base/check.h"
 #include "core/base/octahedral.h"
@@ -17,7 +18,6 @@ constexpr uint32_t kCellVersion = 2, kRelightVersion = 1, kSurfaceVersion = 1;
 constexpr uint32_t kCellMagic = 0x43434c4cu;     // "LLCC"
 constexpr uint32_t kRelightMagic = 0x52434c4cu;  // "LLCR"
 constexpr uint32_t kSurfaceMagic = 0x53434c4cu;  // "LLCS"
-/// A lightmap side. 2·w·h then fits 31 bits, so keys and bases fit 32 with room for kDead and kSky.
 
 absl::Status corrupt(absl::string_view what, absl::string_view why) {
   return absl::DataLossError(absl::StrCat(what, " chunk is corrupt: ", why, "; bake again or fetch it again"));
@@ -62,14 +62,14 @@ Vec3 decode_normal(uint32_t bits) {
   return normalize(from_octahedral({snorm(bits), snorm(bits >> 16)}));
 }
 
-absl::Status check_objects(absl::string_view what, const std::vector<ChunkObject>& objects) {
-  uint64_t keys = 0;
-  for (const ChunkObject& o : objects) {
-    if (!valid_object(o)) return corrupt(what, "an object's lightmap size is out of range");
-    keys += texel_keys(o);
+/// How many texels have codes.
+absl::StatusOr<uint64_t> check_objects(absl::string_view what, const std::vector<ChunkObject>& objects) {
+  if (!std::all_of(objects.begin(), objects.end(), valid_object)) {
+    return corrupt(what, "an object's lightmap size is out of range");
   }
-  if (keys > RelightChunk::kSky) return corrupt(what, "its objects have too many texels");
-  return absl::OkStatus();
+  const uint64_t codes = TexelCodes(objects).count();
+  if (codes > RelightChunk::kSky) return corrupt(what, "its objects have too many texels");
+  return codes;
 }
 
 }  // namespace
@@ -154,18 +154,17 @@ absl::StatusOr<CellChunk> decode_cell(std::span<const uint8_t> bytes) {
   c.near_weights = r.array<uint16_t>(header.near_texels);
   if (!r.at_end()) return corrupt("cell", "its length does not match its counts");
 
-  LL_RETURN_IF_ERROR(check_objects("cell", c.objects));
+  LL_ASSIGN_OR_RETURN(const uint64_t codes, check_objects("cell", c.objects));
   for (const TexelRef& t : c.receivers) {
     if (t.slot >= c.objects.size() || t.key >= texel_keys(c.objects[t.slot])) {
       return corrupt("cell", "a receiver lies outside its object's lightmap");
     }
   }
-  uint64_t keys = 0, near = 0;
-  for (const ChunkObject& o : c.objects) keys += texel_keys(o);
+  uint64_t near = 0;
   for (const uint16_t n : c.near_counts) near += n;
   if (near != c.near_texels.size()) return corrupt("cell", "its near texels do not match their counts");
   for (const uint32_t texel : c.near_texels) {
-    if (texel >= keys) return corrupt("cell", "a near texel lies outside its object's lightmap");
+    if (texel >= codes) return corrupt("cell", "a near texel lies outside its object's lightmap");
   }
   for (const uint32_t p : probes) {
     if (p >= c.probe_count) return corrupt("cell", "a probe index is out of range");
@@ -241,11 +240,9 @@ absl::StatusOr<RelightChunk> decode_relight(std::span<const uint8_t> bytes) {
   c.rays = r.array<uint32_t>(header.rays);
   if (!r.at_end()) return corrupt("relight", "its length does not match its counts");
   if (!is_finite(c.position)) return corrupt("relight", "the probe's position is not finite");
-  LL_RETURN_IF_ERROR(check_objects("relight", c.objects));
-  uint64_t keys = 0;
-  for (const ChunkObject& o : c.objects) keys += texel_keys(o);
+  LL_ASSIGN_OR_RETURN(const uint64_t codes, check_objects("relight", c.objects));
   for (const uint32_t ray : c.rays) {
-    if (ray != RelightChunk::kDead && ray != RelightChunk::kSky && ray >= keys) {
+    if (ray != RelightChunk::kDead && ray != RelightChunk::kSky && ray >= codes) {
       return corrupt("relight", "a ray points outside its objects' lightmaps");
     }
   }

@@ -46,7 +46,8 @@ struct CellChunk {
     uint32_t first_receiver = 0, receivers = 0;
     std::vector<uint32_t> probes;      ///< P indices into the cell's probe list
     std::vector<float> correction;     ///< K: projection[k]·u, u = sh_uniform of every probe
-    std::vector<Half> projection;      ///< K × P × sh_stride, rows Σ_c·V_cᵀ, padding 0; singular values descend
+    std::vector<Half> projection;      ///< K × P × sh_stride, rows Σ_c·V_cᵀ, padding 0; singular values descend (those
+                                       ///< of averaged rows, if V is theirs)
     std::vector<Half> reconstruction;  ///< K × receivers rounded up to 8, columns of U_c, padding 0
     Aabb bounds;
     float error = 0;
@@ -64,6 +65,7 @@ struct CellChunk {
   std::vector<uint32_t> near_texels;   ///< named as RelightChunk::rays are
   std::vector<uint16_t> near_weights;  ///< their share of the irradiance, unorm16 of π
 };
+inline constexpr uint64_t kNearTexelBytes = sizeof(uint32_t) + sizeof(uint16_t);  ///< that each takes
 
 /// What one probe sees along sphere_direction(i, n), i = 0..n-1.
 struct RelightChunk {

@@ -11,7 +11,7 @@ namespace lightloom {
 namespace {
 
 constexpr uint32_t kMagic = 0x5243424cu;  // "LBCR"
-constexpr uint32_t kVersion = 2;
+constexpr uint32_t kVersion = 3;
 
 struct Header {
   uint32_t magic, version, probes, clusters;
@@ -22,7 +22,7 @@ struct Header {
   double error;
   uint64_t coefficients, bytes_projection, bytes_reconstruction;
   float stale;
-  uint32_t reserved;
+  uint32_t near_objects;
 };
 static_assert(sizeof(Header) == 168 && sizeof(ClusterEntry) == 40 && sizeof(ChunkRef) == 40);
 
@@ -52,9 +52,15 @@ std::vector<uint8_t> encode_cell_record(const CellRecord& c) {
   ByteWriter w;
   w.value(Header{kMagic, kVersion, static_cast<uint32_t>(c.probes.size()), static_cast<uint32_t>(c.clusters.size()),
                  c.key, c.chunk, c.bounds.lo, c.bounds.hi, c.gather_rays, c.unseen, c.error, c.coefficients,
-                 c.bytes_projection, c.bytes_reconstruction, c.stale, 0});
+                 c.bytes_projection, c.bytes_reconstruction, c.stale,
+                 static_cast<uint32_t>(c.near.size())});
   w.array(c.probes);
   w.array(c.clusters);
+  for (const NearSurface& near : c.near) {
+    w.value(near.object);
+    w.value(static_cast<uint32_t>(near.keys.size()));
+    w.array(near.keys);
+  }
   write_trace(c.trace, &w);
   return std::move(w).take();
 }
@@ -67,6 +73,11 @@ absl::StatusOr<CellRecord> decode_cell_record(std::span<const uint8_t> bytes) {
   CellRecord c;
   c.probes = r.array<ProbeName>(header.probes);
   c.clusters = r.array<ClusterEntry>(header.clusters);
+  for (uint32_t i = 0; i < header.near_objects && r.ok(); ++i) {
+    NearSurface& near = c.near.emplace_back();
+    near.object = r.value<ChunkObject>();
+    near.keys = r.array<uint32_t>(r.value<uint32_t>());
+  }
   auto trace = read_trace(&r);
   if (!r.at_end()) return corrupt("its length does not match its counts");
   if (!trace.ok()) return corrupt(std::string(trace.status().message()));
@@ -90,6 +101,12 @@ absl::StatusOr<CellRecord> decode_cell_record(std::span<const uint8_t> bytes) {
   if (c.unseen > c.gather_rays) return corrupt("more rays are unseen than were shot");
   if (std::adjacent_find(c.probes.begin(), c.probes.end(), std::greater_equal<>()) != c.probes.end()) {
     return corrupt("its probes do not ascend");
+  }
+  for (const NearSurface& near : c.near) {
+    if (near.keys.empty() ||
+        std::adjacent_find(near.keys.begin(), near.keys.end(), std::greater_equal<>()) != near.keys.end()) {
+      return corrupt("texels of its near fields do not ascend");
+    }
   }
   for (const ClusterEntry& k : c.clusters) {
     if (k.receivers == 0) return corrupt("a cluster has no receivers");

@@ -6,11 +6,19 @@
 #include <span>
 #include <vector>
 
+#include "core/asset/chunk.h"
 #include "core/asset/manifest.h"
 #include "core/probes/probe_name.h"
 #include "core/trace/trace.h"
 
 namespace lightloom {
+
+/// The texels of one object that a cell's near fields name.
+struct NearSurface {
+  ChunkObject object;
+  std::vector<uint32_t> keys;  ///< ascending
+  bool operator==(const NearSurface&) const = default;
+};
 
 /// Same for every run of the task: no times, and no counts that depend on what the worker remembers.
 struct CellRecord {
@@ -18,7 +26,7 @@ struct CellRecord {
   Aabb bounds;  ///< of its receivers
   uint64_t gather_rays = 0;
   uint64_t unseen = 0;                ///< gather rays whose hit no reachable probe sees
-  double error = 0;                   ///< ‖T − T̃‖_F ÷ ‖T‖_F
+  double error = 0;                   ///< CompressedCell::error
   uint64_t coefficients = 0;          ///< Σ rank · receivers over the clusters
   uint64_t bytes_projection = 0;      ///< of the chunk
   uint64_t bytes_reconstruction = 0;  ///< of the chunk
@@ -26,6 +34,7 @@ struct CellRecord {
   Trace trace;
   float stale = 0;                     ///< see Reuse: 0 as it is baked
   std::vector<ProbeName> probes;       ///< that it reads, ascending
+  std::vector<NearSurface> near;       ///< that its near fields name, by object id
   std::vector<ClusterEntry> clusters;  ///< in the chunk's order
   uint64_t receivers() const;          ///< of all clusters
 };

@@ -126,7 +126,7 @@ absl::Status check_params(const BakeParams& p) {
   if (p.rays < 1 || p.rays > 65536) return bad("--rays must be 1 to 65536");
   if (p.relight_rays < 1 || p.relight_rays > 1 << 20) return bad("--relight-rays must be 1 to 1048576");
   if (p.max_rank < 0 || p.max_rank > 256) return bad("--max-rank must be 0 to 256");
-  if (!(p.threshold >= 0) || !std::isfinite(p.threshold)) return bad("--threshold must be ≥ 0");
+  if (!(p.threshold >= 0 && p.threshold <= 1)) return bad("--threshold must be 0 to 1: it is a share of the transport");
   if (!(p.average >= 0 && p.average <= 16)) return bad("--average must be 0 to 16 texels");
   if (p.method == BakeMethod::kSl17 && p.average != 0)
     return bad("--average goes with --method default: sl17 has none");

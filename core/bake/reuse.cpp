@@ -25,6 +25,18 @@ ReuseItem look_up(const Digest& key, const std::vector<Record>& earlier, const s
   return {share > 0 ? ReuseItem::kCrossed : ReuseItem::kHolds, found->second, share};
 }
 
+/// Whether the texels that its near fields name are still there.
+bool names_receivers(const CellRecord& cell, const Plan& plan, const std::map<Digest, uint32_t>& objects) {
+  return std::all_of(cell.near.begin(), cell.near.end(), [&](const NearSurface& near) {
+    const auto it = objects.find(near.object.id);
+    if (it == objects.end()) return false;
+    const LightmapUv& uv = plan.layout.uv[it->second];
+    return static_cast<uint32_t>(uv.width) == near.object.width && static_cast<uint32_t>(uv.height) == near.object.height &&
+           std::all_of(near.keys.begin(), near.keys.end(),
+                       [&](uint32_t key) { return plan.receivers.find(it->second, key) != Receivers::kNone; });
+  });
+}
+
 }  // namespace
 
 Reuse no_reuse(const Plan& plan) {
@@ -36,6 +48,8 @@ absl::StatusOr<Reuse> find_reuse(const Plan& plan, const Scene& scene, const Wor
   const Changes changes(earlier.world, now);
   const auto cells = by_key(earlier.cells), probes = by_key(earlier.probes);
   const auto& planned = plan.placement.probes;
+  std::map<Digest, uint32_t> objects;
+  for (uint32_t o = 0; o < scene.objects.size(); ++o) objects.emplace(scene.objects[o].id, o);
   Reuse out;
   out.cells.resize(plan.cells.size());
   out.probes.resize(planned.size());
@@ -45,7 +59,8 @@ absl::StatusOr<Reuse> find_reuse(const Plan& plan, const Scene& scene, const Wor
       item = look_up(cell_key(plan, scene, plan.cells[i]), earlier.cells, cells, changes);
       if (item.why == ReuseItem::kUnknown) return;
       item.share = std::min(1.0, item.share + static_cast<double>(earlier.cells[item.earlier].stale));
-      item.why = item.share > tolerance ? ReuseItem::kCrossed : ReuseItem::kHolds;
+      const bool stands = item.share == 0 || names_receivers(earlier.cells[item.earlier], plan, objects);
+      item.why = item.share > tolerance || !stands ? ReuseItem::kCrossed : ReuseItem::kHolds;
       return;
     }
     i -= out.cells.size();

@@ -34,8 +34,8 @@ struct Reuse {
 Reuse no_reuse(const Plan& plan);
 
 /// `now`: contents of the plan's world. `tolerance`: the share up to which cells are kept although they may have changed; a
-/// later look back with less finds them. (Relight sets are cheap, and name what they see: they are never kept so.) Error:
-/// cancellation.
+/// later look back with less finds them. Never kept so is what may name texels that are no more: relight sets, which are
+/// cheap, and cells whose near fields reached a texel that is gone. Error: cancellation.
 absl::StatusOr<Reuse> find_reuse(const Plan& plan, const Scene& scene, const WorldContents& now,
                                  const BakeTraces& earlier, double tolerance, const Parallel& parallel);
 

@@ -43,6 +43,7 @@ absl::Status not_planned(std::string_view what, size_t index, size_t planned) {
 CellRecord make_record(const Plan& plan, const CellTask& task, const CellResult& c, const ChunkRef& chunk) {
   CellRecord record;
   record.key = task.key;
+  record.near = c.near;
   record.trace = c.trace;
   record.chunk = chunk;
   record.bounds = c.bounds;

@@ -11,7 +11,7 @@
 namespace lightloom {
 namespace {
 
-constexpr uint32_t kLayout = 1;                   // the version of these bytes
+constexpr uint32_t kLayout = 2;                   // the version of these bytes
 constexpr uint32_t kPayloadMagic = 0x4150424cu;   // "LBPA"
 constexpr uint32_t kArgumentMagic = 0x5241424cu;  // "LBAR"
 constexpr uint32_t kSummaryMagic = 0x5350424cu;   // "LBPS"

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 
 #include "core/base/stopwatch.h"
 #include "core/base/version.h"
@@ -101,13 +102,20 @@ std::map<uint32_t, uint32_t> number_texels(const Plan& plan, const Scene& scene,
 /// Names the near texels of each receiver, in the order of the chunk's. Objects that the chunk does not know yet follow those it
 /// knows.
 void add_near_fields(const Plan& plan, const Scene& scene, int rays, std::span<const uint32_t> order,
-                     const std::vector<std::vector<NearTexel>>& near, CellChunk* chunk) {
+                     const std::vector<std::vector<NearTexel>>& near, CellResult* out) {
+  CellChunk* chunk = &out->chunk;
   std::map<Digest, uint32_t> object_of;
+  std::map<uint32_t, std::set<uint32_t>> keys_of;
   for (const auto& of_receiver : near) {
     for (const NearTexel& n : of_receiver) {
-      const uint32_t o = plan.receivers.all[n.receiver].object;
-      object_of.try_emplace(scene.objects[o].id, o);
+      const Receiver& texel = plan.receivers.all[n.receiver];
+      object_of.try_emplace(scene.objects[texel.object].id, texel.object);
+      keys_of[texel.object].insert(texel.key);
     }
+  }
+  for (const auto& [id, o] : object_of) {
+    const auto& keys = keys_of.at(o);
+    out->near.push_back({chunk_object(plan, scene, o), {keys.begin(), keys.end()}});
   }
   const auto base_of = number_texels(plan, scene, std::move(object_of), &chunk->objects);
 
@@ -192,6 +200,10 @@ CellTask make_cell_task(const Plan& plan, const Scene& scene, const PlannedCell&
     point.links = static_cast<uint32_t>(sl17 ? near[i].size() : std::min(near[i].size(), k));
     point.radius = sl17 ? plan.placement.radius : near[i].size() > k ? std::sqrt(near[i][k].distance2) : 0.0f;
     task.receivers.push_back(std::move(point));
+    if (plan.params.average > 0) {
+      const uint32_t triangle = plan.receivers.grids[r.object].texels[r.texel].triangle;
+      task.sigma.push_back(plan.params.average * texel_size(scene.objects[r.object], plan.layout.uv[r.object], triangle));
+    }
     task.texels.push_back({slot_of.at(r.object), r.key});
   }
   return task;
@@ -235,10 +247,8 @@ absl::StatusOr<CellResult> bake_cell(const RayTracer& tracer, const Plan& plan, 
   if (sl17) options.probe_loss = 0;
   options.relight_rays = static_cast<uint32_t>(task.params.relight_rays);
   options.seed = task.seed;
-  const bool average = task.params.average > 0;
-  const Matrix averaged = average ? average_with_neighbours(transport, positions, normals,
-                                                            task.params.average / task.params.texels_per_metre)
-                                  : Matrix();
+  const bool average = !task.sigma.empty();
+  const Matrix averaged = average ? average_with_neighbours(transport, positions, normals, task.sigma) : Matrix();
   CompressedCell compressed = compress_cell(transport, average ? averaged : transport, positions, options);
   out.error = compressed.error;
 
@@ -257,7 +267,7 @@ absl::StatusOr<CellResult> bake_cell(const RayTracer& tracer, const Plan& plan, 
   for (const uint32_t r : compressed.order) out.chunk.receivers.push_back(task.texels[r]);
   out.chunk.uniform = std::move(compressed.uniform);
   out.chunk.clusters = std::move(compressed.clusters);
-  add_near_fields(plan, tracer.scene(), task.params.rays, compressed.order, near, &out.chunk);
+  add_near_fields(plan, tracer.scene(), task.params.rays, compressed.order, near, &out);
   out.compress_seconds = compress_watch.seconds();
   return out;
 }

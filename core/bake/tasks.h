@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/asset/chunk.h"
+#include "core/bake/cell_record.h"
 #include "core/bake/plan.h"
 #include "core/receivers/receiver_search.h"
 #include "core/trace/trace.h"
@@ -25,6 +26,7 @@ struct CellTask {
   std::vector<ChunkObject> objects;
   std::vector<TexelRef> texels;        ///< per receiver
   std::vector<GatherPoint> receivers;  ///< `near` indexes `probes`
+  std::vector<float> sigma;            ///< of each, for average_with_neighbours(), metres; empty: S = T
   std::vector<Vec3> probes;
   std::vector<uint32_t> probe_ids;  ///< the plan's index of each probe
   uint64_t seed = 0;                ///< of the cell's level and coordinates
@@ -35,6 +37,7 @@ struct CellTask {
 struct CellResult {
   CellChunk chunk;
   std::vector<uint32_t> probe_ids;  ///< the cell's probe list: the plan's indices of probes that it reads
+  std::vector<NearSurface> near;    ///< CellRecord::near
   GatherStats stats;
   double error = 0;
   Aabb bounds;

@@ -32,10 +32,19 @@ double relative(const std::vector<double>& error2, const std::vector<double>& en
     sum += weight * std::sqrt(std::sqrt(std::sqrt(error2[l] / energy[l])));
     weights += weight;
   }
-  return weights > 0 ? std::pow(sum / weights, 4) : 0;
+  const double mean = weights > 0 ? sum / weights : 0;  // no pow(): its last bit is the C library's
+  return mean * mean * mean * mean;
 }
 
 }  // namespace
+
+double ProbeErrors::near_texels_by(int rays) const {
+  const size_t i = rays < kNearRays[1] ? 0 : 1;  // of the pieces between 128 and 256, 256 and 512
+  double doublings = 0;                         // from its begin; log2() would round as the C library likes
+  for (int n = kNearRays[i]; n < rays; n *= 2) ++doublings;
+  for (int n = kNearRays[i]; n > rays; n /= 2) --doublings;
+  return std::max(0.0, near_texels[i] + doublings * (near_texels[i + 1] - near_texels[i]));
+}
 
 ErrorSample::ErrorSample(const RayTracer& tracer, const Plan& ground)
     : tracer_(tracer), ground_(ground), search_(tracer, ground.layout, ground.receivers) {}

@@ -23,6 +23,8 @@ struct ProbeErrors {
   double relight = 0;                               ///< of one relight ray: N rays have 1/√N of it
   std::array<double, 3> near_texels{};              ///< in a receiver's near field, by kNearRays
   static constexpr int kNearRays[] = {128, 256, 512};
+  /// With 2ᵏ rays: in a line over k.
+  double near_texels_by(int rays) const;
 };
 using ErrorsByReach = std::array<ProbeErrors, kReaches.size()>;
 

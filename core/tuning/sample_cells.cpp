@@ -12,6 +12,7 @@
 namespace lightloom {
 namespace {
 
+constexpr double kClusterBytes = 48;      // besides its arrays
 constexpr size_t kShare = 12, kMost = 6;  // of the cells
 constexpr uint32_t kRelightRays = 512;    // it is only asked how E changes
 constexpr size_t J = kMaxShCount, kOrders = kMaxShOrder + 1;
@@ -60,7 +61,6 @@ absl::StatusOr<SampleCells> SampleCells::create(const RayTracer& tracer, const P
                                                 const Parallel& how) {
   SampleCells out;
   out.lights_ = sample.lights().count();
-  out.average_ = plan.params.average / plan.params.texels_per_metre;
   const size_t lights = out.lights_;
   // Lights count alike, but for those that light hardly anything (as in ErrorSample).
   const double typical = sample.typical_energy();
@@ -101,6 +101,7 @@ absl::StatusOr<SampleCells> SampleCells::create(const RayTracer& tracer, const P
     for (auto& near : cell.near) near.assign(n * lights, 0);
     cell.judged.assign(n * kJudges * lights * kOrders, 0);
     cell.seed = task.seed;
+    cell.sigma = task.sigma;
     for (const GatherPoint& r : task.receivers) {
       cell.positions.push_back(r.point.position);
       cell.normals.push_back(r.point.normal);
@@ -114,7 +115,7 @@ absl::StatusOr<SampleCells> SampleCells::create(const RayTracer& tracer, const P
     }
     for (size_t i = 0; i < n; i += kPiece) pieces.push_back({c, i, std::min(n, i + kPiece)});
   }
-  const bool gathered = parallel_for(pieces.size(), quiet, [&](uint64_t i) {
+  const bool gathered = parallel_for(pieces.size(), how, [&](uint64_t i) {
     const Piece& piece = pieces[i];
     const CellTask& task = tasks[piece.cell];
     Cell& cell = out.cells_[piece.cell];
@@ -179,14 +180,15 @@ absl::StatusOr<CompressionCost> SampleCells::compress(const CompressionChoice& c
     options.seed = cell.seed;
     const Matrix transport = narrowed(cell.transport[of_rays], choice.order);
     const CompressedCell compressed = compress_cell(
-        transport, average_with_neighbours(transport, cell.positions, cell.normals, average_), cell.positions, options);
+        transport, average_with_neighbours(transport, cell.positions, cell.normals, cell.sigma), cell.positions, options);
     s.receivers = static_cast<double>(cell.positions.size());
     s.other = s.receivers * sizeof(uint16_t);
     for (const CellChunk::Cluster& cluster : compressed.clusters) {
       s.projection += static_cast<double>(cluster.projection.size() * sizeof(Half));
       s.other +=
           static_cast<double>(cluster.reconstruction.size() * sizeof(Half) + cluster.correction.size() * sizeof(float) +
-                              cluster.probes.size() * sizeof(uint32_t));
+                              cluster.probes.size() * sizeof(uint32_t)) +
+          kClusterBytes;
       CellChunk::Cluster coarse = cluster;
       for (Half& h : coarse.projection) h = rounded_further(h);
       for (Half& h : coarse.reconstruction) h = rounded_further(h);

@@ -42,6 +42,7 @@ class SampleCells {
 
   struct Cell {
     std::vector<Vec3> positions, normals;
+    std::vector<float> sigma;  // CellTask::sigma
     Matrix transport[kRayCounts];            // of the widest order, by kRays
     std::vector<double> near[kRayCounts];    // E from near fields: receivers × lights, by kRays
     std::vector<float> judged;               // E: receivers × judging batches × lights × orders
@@ -50,7 +51,6 @@ class SampleCells {
   };
   std::vector<Cell> cells_;
   size_t lights_ = 0;
-  float average_ = 0;           // σ, metres, > 0
   std::vector<double> weight_;  // per light, of a squared error
 };
 

@@ -6,6 +6,7 @@
 #include <map>
 #include <utility>
 
+#include "core/asset/chunk.h"
 #include "core/base/stopwatch.h"
 #include "core/tuning/error_sample.h"
 #include "core/tuning/sample_cells.h"
@@ -21,8 +22,6 @@ constexpr uint64_t kMostProbes = 30000;
 constexpr double kAll = 0.9, kBandlimit = 0.82, kRelight = 0.15, kCompression = 0.33;
 // Where it is all that can be had, the rest is to add little to it.
 constexpr double kOfBest = 0.92;
-// The knee: k times the bytes are worth k^-¼ times the error.
-constexpr double kKnee = 0.25;
 constexpr int kRelightRays[] = {512, 1024, 2048, 4096, 8192};
 // Thresholds, times the error that compression may have. The middle one is tried first.
 constexpr double kMiddle = 1, kTight = 0.5, kLoose[] = {2, 1.4};
@@ -31,7 +30,8 @@ constexpr int kRanks[] = {32, 64};
 constexpr double kOfBudget = 0.95;                         // few cells tell how well a level compresses
 constexpr float kAverage = 1;                              // texels
 constexpr size_t kExact = 3;                               // models that are looked at closely
-constexpr double kSurfaceBytes = 24, kNearTexelBytes = 6;  // per receiver
+// Per receiver: its texel in the surface; its name, and how many near texels it has.
+constexpr double kSurfaceBytes = 24, kReceiverBytes = 10;
 constexpr double kProbeBytes = 200;                        // besides its rays
 constexpr int kTypicalOrder = 6;                           // with which compression is tried before the order is known
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -50,6 +50,8 @@ int fewest(const int (&counts)[N], double of_one, double most) {
   }
   return counts[N - 1];
 }
+
+double square_of_square(double x) { return x * x * x * x; }
 
 /// A spacing that was tried.
 struct Trial {
@@ -109,7 +111,11 @@ class Tuner {
       if (at->best() <= kBandlimit * error) break;
       LL_ASSIGN_OR_RETURN(const double here, merit(step));
       LL_ASSIGN_OR_RETURN(const double finer, merit(step + 1));
-      if (finer >= here) return finish_best(step, &Tuner::knee);
+      if (finer >= here) {
+        LL_ASSIGN_OR_RETURN(Tuning out, finish_best(step, &Tuner::knee));
+        out.met = out.chosen.parts.total() <= error;
+        return out;
+      }
     }
     target_ = error;
     LL_ASSIGN_OR_RETURN(Tuning out, finish_best(step, &Tuner::smallest));
@@ -161,24 +167,30 @@ class Tuner {
       above = std::max(above, m.bytes / f.bytes);
     }
     return absl::InvalidArgumentError("--budget is too small: the least model of this level takes about " +
-                                      std::to_string(static_cast<uint64_t>(least)) +
+                                      std::to_string(static_cast<uint64_t>(std::ceil(least * above / kOfBudget))) +
                                       " bytes; give more, or a coarser lightmap by --texels-per-metre");
   }
 
   int plans() const { return static_cast<int>(trials_.size()); }
 
  private:
-  /// What is best of one spacing, and how good that is: less is better, infinity is none.
+  /// How good a model is: one that has target_ is better than one that has not, then less is better.
+  struct Merit {
+    bool missed = true;
+    double value = kInfinity;
+    auto operator<=>(const Merit&) const = default;
+  };
+  /// What is best of one spacing; infinity is none.
   struct Found {
     double merit = kInfinity;
     Choice choice;
   };
 
-  /// Less is better: the fewest bytes for target_, if there is one, where missing it is as bad as at the knee; else the knee.
+  /// Less is better: the fewest bytes for target_, if there is one, where missing it is as bad as at the knee; else the knee,
+  /// where k times the bytes are worth k^-¼ times the error.
   double merit_of(const TunedModel& m) const {
     const double total = m.parts.total();
-    if (target_ > 0) return m.bytes * std::pow(std::max(1.0, total / target_), 1 / kKnee);
-    return total * std::pow(m.bytes, kKnee);
+    return m.bytes * square_of_square(target_ > 0 ? std::max(1.0, total / target_) : total);
   }
 
   /// The best for target_.
@@ -242,16 +254,17 @@ class Tuner {
     std::stable_sort(considered_.begin(), considered_.end(),
                      [](const Found& a, const Found& b) { return a.merit < b.merit; });
     considered_.resize(std::min(considered_.size(), kExact));
-    Found exact;
+    Merit best_merit;
     TunedModel chosen;
     for (const Found& found : considered_) {
       LL_ASSIGN_OR_RETURN(const TunedModel m, model(found.choice));
-      const double merit = merit_of(m);
-      if (merit >= exact.merit) continue;
-      exact = {merit, found.choice};
+      const Merit merit{target_ > 0 && m.parts.total() > target_, merit_of(m)};
+      if (!(merit < best_merit)) continue;
+      best_merit = merit;
+      best.choice = found.choice;
       chosen = m;
     }
-    return finish(exact.choice, chosen);
+    return finish(best.choice, chosen);
   }
 
   absl::StatusOr<Tuning> finish(const Choice& choice, const TunedModel& chosen) {
@@ -302,7 +315,7 @@ class Tuner {
       typical_.emplace(key, c);
     }
     Compressed c = typical_.at(key);
-    c.cost.projection *= static_cast<double>(sh_count(choice.order)) / sh_count(kTypicalOrder);
+    c.cost.projection *= static_cast<double>(sh_stride(choice.order)) / sh_stride(kTypicalOrder);
     return model(choice, c);
   }
 
@@ -331,11 +344,9 @@ class Tuner {
     out.parts.fp16 = c.cost.fp16;
     out.parts.truncation = c.truncation;
     out.parts.noise = std::sqrt(c.cost.error * c.cost.error - c.truncation * c.truncation);
-    const auto& counts = ProbeErrors::kNearRays;
-    const auto rays = std::lower_bound(std::begin(counts), std::end(counts) - 1, c.choice.rays);
-    const double near_texels = errors.near_texels[static_cast<size_t>(rays - std::begin(counts))];
     out.bytes = static_cast<double>(at->plan.receivers.all.size()) *
-                    (c.cost.projection + c.cost.other + kSurfaceBytes + kNearTexelBytes * near_texels) +
+                    (c.cost.projection + c.cost.other + kSurfaceBytes + kReceiverBytes +
+                     static_cast<double>(kNearTexelBytes) * errors.near_texels_by(c.choice.rays)) +
                 static_cast<double>(out.probes) * (4.0 * out.params.relight_rays + kProbeBytes);
     return out;
   }

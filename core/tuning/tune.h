@@ -11,7 +11,7 @@
 namespace lightloom {
 
 /// Changes with any change of what is chosen. Choices that are on record hold without it; what is remembered of the tuner's does not.
-inline constexpr std::string_view kTunerVersion = "4";
+inline constexpr std::string_view kTunerVersion = "5";
 
 /// One of them is set.
 struct TuneTarget {

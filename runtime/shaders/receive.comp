@@ -89,7 +89,8 @@ void main() {
         for (uint i = words[near_first_at + kOctet * o + n]; i < near_end; ++i) {
           e += uintBitsToFloat(words[near_at + 2 * i + 1]) * radiosity[words[near_at + 2 * i]].rgb;
         }
-        const vec3 bounded = clamp(e, -limit, limit);
+        // A hostile asset can make NaN, which clamp() may keep, and feedback would for ever.
+        const vec3 bounded = mix(clamp(e, -limit, limit), vec3(0.0), isnan(e));
         for (uint c = 0; c < 3; ++c) store(3 * element + c, bounded[c], limit[c], stays);
       }
     }

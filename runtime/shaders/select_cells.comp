@@ -1,4 +1,4 @@
-// The cells whose E is computed in this frame: at most max_cells of those with a relit probe, in turn, as one list per
+// The cells whose E is computed in this frame: at most max_cells of those that mark_cells.comp has marked, in turn, as one list per
 // pool with the workgroups that each one needs. One workgroup, so that the lists' order is that of the cells.
 #version 450
 #include "layout.h"

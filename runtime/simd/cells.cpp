@@ -25,10 +25,12 @@ size_t each_receiver(const PackedCell& cell, size_t most, Body body) {
 /// E += Σ_i w_i·B_i of receivers first … first + count − 1; block[colour·kReceiveBlock + r].
 void add_near_fields(const PackedCell& cell, uint32_t first, uint32_t count, const float* radiosity, float* block) {
   for (uint32_t r = 0; r < count; ++r) {
+    float e[3] = {0, 0, 0};
     for (uint32_t i = cell.near_first[first + r]; i < cell.near_first[first + r + 1]; ++i) {
       const float* const b = radiosity + size_t{3} * cell.near_elements[i];
-      for (uint32_t c = 0; c < 3; ++c) block[c * kReceiveBlock + r] += cell.near_weights[i] * b[c];
+      for (uint32_t c = 0; c < 3; ++c) e[c] += cell.near_weights[i] * b[c];
     }
+    for (uint32_t c = 0; c < 3; ++c) block[c * kReceiveBlock + r] += e[c];
   }
 }
 

@@ -103,6 +103,7 @@ PackedCell pack_cell(const SourceCell& cell, uint32_t surface_elements, bool ful
   packed.near_tiles = Array<uint64_t>(memory, tile_words(surface_elements));
   packed.coefficients = Array<float>(memory, end.coefficients);
   packed.projection_bytes = end.projection * sizeof(Half);
+  packed.reconstruction_bytes = cell.near_elements.size() * kNearTexelBytes;
 
   std::vector<uint32_t> near_first = {0};
   for (const uint16_t count : cell.chunk.near_counts) near_first.push_back(near_first.back() + count);

@@ -30,7 +30,7 @@ struct PackedCell {
   Array<uint64_t> near_tiles;  ///< bit t: one of them is in tile t
   Array<float> coefficients;
   uint32_t stride = 0;
-  uint64_t projection_bytes = 0, reconstruction_bytes = 0;  ///< in the asset
+  uint64_t projection_bytes = 0, reconstruction_bytes = 0;  ///< in the asset; near fields, too
 
   ClusterView view(const PackedCluster& c) const;
   uint64_t bytes() const;

@@ -135,6 +135,11 @@ void Surface::find_limit() {
   }
 }
 
+namespace {
+/// In [−limit, limit], also what a hostile asset has made NaN: std::clamp would keep that, and feedback for ever.
+float bounded(float value, float limit) { return std::min(limit, std::max(-limit, value)); }
+}  // namespace
+
 void Surface::receive(const uint32_t* elements, uint32_t count, const float* block, bool stays) {
   LL_CHECK(smoothing_ || !stays);
   bool any_shown = false, any_left = false;
@@ -142,12 +147,12 @@ void Surface::receive(const uint32_t* elements, uint32_t count, const float* blo
     bool shown = false, left = false;
     for (uint32_t c = 0; c < 3; ++c) {
       float& e = irradiance_[size_t{3} * elements[i] + c];
-      const float value = std::clamp(block[c * kReceiveBlock + i], -limit_[c], limit_[c]);
+      const float value = bounded(block[c * kReceiveBlock + i], limit_[c]);
       float next = value;
       if (smoothing_) {
         const float old = std::exchange(target_[size_t{3} * elements[i] + c], value);
         if (stays) next = e;
-        if (!stays && e != old) next = std::clamp(e + (value - old), -limit_[c], limit_[c]);
+        if (!stays && e != old) next = bounded(e + (value - old), limit_[c]);
       }
       shown |= e != next;
       left |= next != value;

@@ -4,6 +4,11 @@
 #include <cstring>
 
 namespace lightloom {
+namespace {
+
+constexpr uint64_t kPage = 4096;  // of a table: fewer bytes are not worth a copy command of their own
+
+}  // namespace
 
 void Staging::copy(VkCommandBuffer commands, VkBuffer to, uint64_t offset, const uint8_t* from, uint64_t bytes) {
   std::memcpy(buffer_->mapped() + at_, from, bytes);
@@ -26,10 +31,11 @@ uint64_t UploadQueue::pending_bytes() const {
 }
 
 absl::Status ShadowTable::create(Context* context, uint64_t bytes, uint64_t unit, uint8_t value) {
-  unit_ = unit;
+  page_ = (kPage + unit - 1) / unit * unit;
   value_ = value;
   LL_ASSIGN_OR_RETURN(device_, Buffer::create(context, bytes, BufferUse::kDevice));
   host_.assign(bytes, value);
+  pending_.assign((bytes + page_ - 1) / page_, false);
   return absl::OkStatus();
 }
 
@@ -40,21 +46,27 @@ void ShadowTable::clear(VkCommandBuffer commands, const Context& context) const 
 }
 
 void ShadowTable::touch(uint64_t begin, uint64_t end) {
-  begin = begin / unit_ * unit_;
-  if (begin_ == end_) {
-    begin_ = begin;
-    end_ = end;
-  } else {
-    begin_ = std::min(begin_, begin);
-    end_ = std::max(end_, end);
+  for (size_t page = begin / page_; page * page_ < end; ++page) {
+    if (pending_[page]) continue;
+    pending_[page] = true;
+    pending_bytes_ += page_end(page) - page * page_;
   }
 }
 
 void ShadowTable::record(VkCommandBuffer commands, Staging* staging, uint64_t bytes) {
-  const uint64_t part = std::min({end_ - begin_, bytes, staging->room()}) / unit_ * unit_;
-  if (part == 0) return;
-  staging->copy(commands, device_.handle(), begin_, host_.data() + begin_, part);
-  begin_ += part;
+  for (size_t first = 0; pending_bytes_ > 0 && first < pending_.size(); ++first) {
+    if (!pending_[first]) continue;
+    // Neighbours in one copy.
+    const uint64_t begin = first * page_, most = std::min(bytes, staging->room());
+    size_t end = first;
+    for (; end < pending_.size() && pending_[end] && page_end(end) - begin <= most; ++end) pending_[end] = false;
+    if (end == first) return;
+    const uint64_t part = page_end(end - 1) - begin;
+    staging->copy(commands, device_.handle(), begin, host_.data() + begin, part);
+    bytes -= part;
+    pending_bytes_ -= part;
+    first = end - 1;
+  }
 }
 
 }  // namespace lightloom

@@ -69,7 +69,7 @@ class UploadQueue {
 /// An array that the host changes here and there: a copy of it, and what of it the device has not yet.
 class ShadowTable {
  public:
-  explicit ShadowTable(std::pmr::memory_resource* memory) : host_(memory) {}
+  explicit ShadowTable(std::pmr::memory_resource* memory) : host_(memory), pending_(memory) {}
 
   /// Records of `unit` bytes reach the device as a whole. All bytes are `value`.
   absl::Status create(Context* context, uint64_t bytes, uint64_t unit, uint8_t value = 0);
@@ -82,17 +82,21 @@ class ShadowTable {
     return reinterpret_cast<T*>(host_.data());
   }
   uint64_t bytes() const { return host_.size(); }
-  /// Bytes [begin, end) differ from the device's. REQUIRES: end is a multiple of the unit.
+  /// Bytes [begin, end) differ from the device's.
   void touch(uint64_t begin, uint64_t end);
-  uint64_t pending_bytes() const { return end_ - begin_; }
+  uint64_t pending_bytes() const { return pending_bytes_; }
   /// Records at most `bytes` of what the device does not have.
   void record(VkCommandBuffer commands, Staging* staging, uint64_t bytes);
 
  private:
   Buffer device_;
   std::pmr::vector<uint8_t> host_;
-  uint64_t unit_ = 4, begin_ = 0, end_ = 0;
+  std::pmr::vector<bool> pending_;  // per page: the device does not have all of it. Pages, so that touch() needs no memory
+  uint64_t pending_bytes_ = 0;
+  uint64_t page_ = 4;
   uint8_t value_ = 0;
+
+  uint64_t page_end(size_t page) const { return std::min(bytes(), (page + 1) * page_); }
 };
 
 template <class Finished>

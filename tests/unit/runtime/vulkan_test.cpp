@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <ostream>
 #include <string>
 #include <vector>
@@ -146,17 +147,17 @@ TEST(Vulkan, FeedbackAtHighAlbedoIsMonotoneAndBounded) {
   for (const Vec3 e : runtime.irradiance()) EXPECT_LT(e.x, 1.001f * 314.16f);
 }
 
-TEST(Vulkan, NoAssetMakesFeedbackDiverge) {
+class HostileAsset : public ::testing::TestWithParam<uint32_t> {};
+
+/// |E| ≤ π·C ÷ (1 − 0.99), C ≤ 0.99·20/π + 5, whatever the clusters hold.
+void expect_bounded(uint32_t device, const std::function<void(CellChunk::Cluster*)>& edit) {
   SyntheticAsset asset = testing::random_asset({});
-  // A baker would not write that: every coefficient ten thousand times too large.
   for (CellEntry& cell : asset.manifest.cells) {
     CellChunk chunk = *decode_cell(asset.chunks.at(cell.chunk.digest));
-    for (CellChunk::Cluster& c : chunk.clusters) {
-      for (Half& h : c.reconstruction) h = float_to_half(1e4f * half_to_float(h));
-    }
+    for (CellChunk::Cluster& c : chunk.clusters) edit(&c);
     cell.chunk = asset.put(encode_cell(chunk));
   }
-  TestRuntime runtime;
+  TestRuntime runtime(device);
   ASSERT_EQ(runtime.load(asset), LIGHTLOOM_OK) << joined(runtime.received().errors);
   const size_t S = runtime.counts().surface_elements;
   SurfaceLight light = testing::random_light(static_cast<uint32_t>(S), 7);
@@ -164,11 +165,29 @@ TEST(Vulkan, NoAssetMakesFeedbackDiverge) {
   light.environment = {1, 1, 1};
   runtime.light(light);
   ASSERT_EQ(lightloom_update(runtime.get(), 1000), LIGHTLOOM_OK);
-  // |E| ≤ π·C ÷ (1 − 0.99), C ≤ 0.99·20/π + 5.
   for (const Vec3 e : runtime.irradiance()) {
     for (int c = 0; c < 3; ++c) EXPECT_LE(std::abs(e[c]), 3.1416f * 11.31f * 100.1f);
   }
 }
+
+TEST_P(HostileAsset, LargeCoefficientsDoNotMakeFeedbackDiverge) {
+  expect_bounded(GetParam(), [](CellChunk::Cluster* c) {
+    for (Half& h : c->reconstruction) h = float_to_half(1e4f * half_to_float(h));
+  });
+}
+
+TEST_P(HostileAsset, InfinitiesThatCancelDoNotMakeItNan) {
+  expect_bounded(GetParam(), [](CellChunk::Cluster* c) {
+    for (size_t k = 0; k < c->correction.size(); ++k) {
+      c->correction[k] = 3e38f;
+      const size_t column = c->reconstruction.size() / c->correction.size();
+      for (size_t r = 0; r < column; ++r) c->reconstruction[k * column + r] = float_to_half(k % 2 == 0 ? 100.0f : -100.0f);
+    }
+  });
+}
+
+INSTANTIATE_TEST_SUITE_P(Devices, HostileAsset, ::testing::Values(0u, uint32_t{LIGHTLOOM_CREATE_CPU}),
+                         [](const auto& param) { return param.param == 0 ? "Vulkan" : "Simd"; });
 
 TEST(Vulkan, StatsCountFramesTimeAndBytes) {
   SyntheticAsset asset = testing::random_asset({});

@@ -108,7 +108,7 @@ TEST_F(AssetTest, ManifestErrorsNameTheFile) {
 
 TEST_F(AssetTest, VerifyAcceptsTheSample) {
   write_sample(loom_);
-  EXPECT_EQ(chunks().size(), 4u);
+  EXPECT_EQ(chunks().size(), 5u);
   EXPECT_TRUE(verify_asset(loom_).ok()) << verify_asset(loom_);
 }
 
@@ -148,7 +148,7 @@ TEST_F(AssetTest, VerifyFindsTheChunkOfAnotherObject) {
   ASSERT_TRUE(write_manifest(loom_, m).ok());
   const absl::Status status = verify_asset(loom_);
   EXPECT_EQ(status.code(), absl::StatusCode::kDataLoss) << status;
-  EXPECT_THAT(std::string(status.message()), HasSubstr("surface of object 'Wände'"));
+  EXPECT_THAT(std::string(status.message()), HasSubstr("surface of object 'floor'"));
 }
 
 TEST_F(AssetTest, VerifyFindsAChunkOfAnotherKind) {
@@ -157,6 +157,34 @@ TEST_F(AssetTest, VerifyFindsAChunkOfAnotherKind) {
   m.cells[0].chunk = m.probes[0].relight;
   ASSERT_TRUE(write_manifest(loom_, m).ok());
   EXPECT_THAT(std::string(verify_asset(loom_).message()), HasSubstr("cell 0: cell chunk is corrupt"));
+}
+
+TEST_F(AssetTest, VerifyFindsTexelsThatNoSurfaceHas) {
+  struct Case {
+    const char* message;
+    std::function<void(CellChunk&)> edit;
+  };
+  const std::vector<Case> cases = {
+      {"a receiver that no surface has", [](CellChunk& c) { c.receivers[4].key = 8; }},
+      {"a receiver that is there twice", [](CellChunk& c) { c.receivers[4] = c.receivers[1]; }},
+      {"a texel that no surface has", [](CellChunk& c) { c.near_texels[0] = 1; }},
+  };
+  for (const Case& each : cases) {
+    write_sample(loom_);
+    CellChunk cell = sample_cell();
+    each.edit(cell);
+    Manifest m = sample_manifest();
+    m.cells[0].chunk = *chunk_store(loom_).put(encode_cell(cell));
+    ASSERT_TRUE(write_manifest(loom_, m).ok());
+    EXPECT_THAT(std::string(verify_asset(loom_).message()), HasSubstr(each.message));
+  }
+  write_sample(loom_);
+  RelightChunk relight = testing::sample_relight();
+  relight.rays[3] = 17;
+  Manifest m = sample_manifest();
+  m.probes[0].relight = *chunk_store(loom_).put(encode_relight(relight));
+  ASSERT_TRUE(write_manifest(loom_, m).ok());
+  EXPECT_THAT(std::string(verify_asset(loom_).message()), HasSubstr("relight set of probe 0: a texel that no surface"));
 }
 
 TEST_F(AssetTest, VerifyFindsEveryDisagreement) {

@@ -68,10 +68,20 @@ RelightChunk sample_relight() {
 SurfaceChunk sample_surface() {
   SurfaceChunk c;
   c.object = kFirst;
-  c.keys = {0, 3, 8, 15};
+  c.keys = {0, 3, 7, 15};
   c.positions = {{0, 0, 0}, {1, 2, 3}, {-1, -2, -3}, {0.5f, 0.25f, 100}};
   c.normals = {{0, 0, 1}, {1, 0, 0}, {0, -1, 0}, {0, 0, -1}};
   c.areas = {0.5f, 0.25f, 1, 2};
+  return c;
+}
+
+SurfaceChunk other_sample_surface() {
+  SurfaceChunk c;
+  c.object = kSecond;
+  c.keys = {0, 4, 17};
+  c.positions = {{5, 5, 5}, {4, 5, 6}, {-4, 0.125f, 6}};
+  c.normals = {{0, 1, 0}, {-1, 0, 0}, {0, 0, 1}};
+  c.areas = {0.75f, 1, 3};
   return c;
 }
 
@@ -103,7 +113,7 @@ Manifest sample_manifest() {
   m.height = 8;
   m.bounds = {{-4, -3, -2}, {4, 3, 2}};
   m.objects = {{kFirst.id, "floor", 4, 2, 1, 1, ref(encode_surface(sample_surface()))},
-               {kSecond.id, "Wände", 3, 3, 8, 2, {}}};
+               {kSecond.id, "Wände", 3, 3, 8, 2, ref(encode_surface(other_sample_surface()))}};
   m.probes = {{relight.position, {0, -1, 0}, 0, ref(encode_relight(relight))},
               {other.position, {1, -1, 0}, 5, ref(encode_relight(other))}};
   CellEntry entry;
@@ -132,6 +142,7 @@ void write_sample(const std::filesystem::path& loom) {
   LL_CHECK(store.put(encode_relight(sample_relight())).ok());
   LL_CHECK(store.put(encode_relight(other)).ok());
   LL_CHECK(store.put(encode_surface(sample_surface())).ok());
+  LL_CHECK(store.put(encode_surface(other_sample_surface())).ok());
   LL_CHECK(write_manifest(loom, sample_manifest()).ok());
 }
 

@@ -24,6 +24,7 @@ CellRecord record() {
   r.key = sha256("key");
   r.trace = {{-1, {0, -4, 2}, {1, 2, 3}}, 7, {0x10, 0x35}};  // two cells that no ray crossed, four that some did
   r.stale = 0.25f;
+  r.near = {{{sha256("floor"), 4, 4}, {3, 8}}, {{sha256("wall"), 2, 2}, {1}}};
   r.probes = {{{2, 0, 0}, 0}, {{3, 0, 0}, 0}, {{3, 0, 0}, 4}};
   r.clusters = {{{{-1, 0, 2}, {0, 1, 3}}, 30, 4, 3, 0.01f}, {{{0, 0, 2}, {1, 2, 3}}, 20, 1, 2, 0.02f}};
   r.coefficients = 30 * 4 + 20;
@@ -34,7 +35,7 @@ CellRecord record() {
 // Offsets of the header's fields.
 constexpr size_t kProbes = 8, kClusters = 12, kChunkSize = 80, kLo = 88, kUnseen = 120, kError = 128,
                  kCoefficients = 136, kBytesProjection = 144, kStale = 160, kProbeNames = 176, kClusterList = 224,
-                 kTrace = 304, kSky = kTrace + 28, kRunCount = kTrace + 32, kRuns = 352;
+                 kNearKeys = 352, kTrace = 420, kSky = kTrace + 28, kRunCount = kTrace + 32, kRuns = 464;
 
 TEST(CellRecord, RoundTrip) {
   const CellRecord in = record();
@@ -47,6 +48,7 @@ TEST(CellRecord, RoundTrip) {
   EXPECT_EQ(out->unseen, in.unseen);
   EXPECT_EQ(out->error, in.error);
   EXPECT_EQ(out->key, in.key);
+  EXPECT_EQ(out->near, in.near);
   EXPECT_EQ(out->trace, in.trace);
   EXPECT_EQ(out->stale, in.stale);
   EXPECT_EQ(out->probes, in.probes);
@@ -67,6 +69,7 @@ TEST(CellRecord, RefusesOtherLengthsAndCounts) {
   // Receivers, rank and probes of the first cluster: sums and sizes no longer fit.
   test::expect_count_checked(bytes, kClusterList + 24, decode_cell_record);
   test::expect_count_checked(bytes, kClusterList + 28, decode_cell_record);
+  test::expect_count_checked(bytes, kNearKeys - 8, decode_cell_record);
   test::expect_count_checked(bytes, kRunCount, decode_cell_record);
 }
 
@@ -91,6 +94,7 @@ TEST(CellRecord, RefusesNumbersOutOfRange) {
   EXPECT_THAT(error(with(bytes, kClusterList, kNan)), HasSubstr("cluster's bounds"));
   EXPECT_THAT(error(with(bytes, kClusterList + 32, 4u)), HasSubstr("more probes"));
   EXPECT_THAT(error(with(bytes, kClusterList + 36, kInf)), HasSubstr("cluster's error"));
+  EXPECT_THAT(error(with(bytes, kNearKeys, 8u)), HasSubstr("near fields do not ascend"));
   EXPECT_THAT(error(with(bytes, kStale, 1.5f)), HasSubstr("staleness"));
   EXPECT_THAT(error(with(bytes, kStale, kNan)), HasSubstr("staleness"));
   EXPECT_THAT(error(with(bytes, kTrace, 61)), HasSubstr("grid"));

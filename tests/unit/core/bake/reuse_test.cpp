@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "core/asset/asset.h"
 #include "core/bake/bake.h"
 #include "core/scene/builtin.h"
@@ -90,14 +92,41 @@ class Edited {
     EXPECT_EQ(verify_asset(loom()), absl::OkStatus());
   }
 
+  /// With any tolerance what is kept must fit what is baked anew; a later bake without one finishes it. Returns how many
+  /// cells were kept stale.
+  uint64_t edit_with_tolerance(double tolerance, Rng* rng) {
+    Scene before = scene_;
+    const test::Edit edit = test::random_edit(&scene_, rng);
+    SCOPED_TRACE(edit.what);
+    const auto traces = [&] {
+      return test::value_or_die(
+          decode_bake_traces(test::value_or_die(read_traces(loom(), test::value_or_die(read_manifest(loom()))))));
+    };
+    BakeTraces earlier = traces();
+    if (!rebake(&earlier, tolerance).ok()) {
+      scene_ = std::move(before);
+      return 0;
+    }
+    EXPECT_EQ(verify_asset(loom()), absl::OkStatus());
+    const Manifest lenient = test::value_or_die(read_manifest(loom()));
+    const auto stale = static_cast<uint64_t>(
+        std::count_if(lenient.cells.begin(), lenient.cells.end(), [](const CellEntry& c) { return c.stale > 0; }));
+    earlier = traces();
+    (void)test::value_or_die(rebake(&earlier));
+    const Manifest finished = test::value_or_die(read_manifest(loom()));
+    (void)test::value_or_die(rebake(nullptr));
+    EXPECT_EQ(encode_manifest(finished), encode_manifest(test::value_or_die(read_manifest(loom()))));
+    return stale;
+  }
+
   uint64_t reused() const { return reused_; }
   uint64_t cells() const { return cells_; }
 
  private:
   std::filesystem::path loom() const { return folder_.path() / "edited.loom"; }
-  absl::StatusOr<BakeReport> rebake(const BakeTraces* earlier) const {
+  absl::StatusOr<BakeReport> rebake(const BakeTraces* earlier, double tolerance = 0) const {
     const auto tracer = test::value_or_die(RayTracer::create(scene_));
-    return bake(*tracer, params_, loom(), {}, earlier);
+    return bake(*tracer, params_, loom(), {}, earlier, tolerance);
   }
 
   test::TemporaryFolder folder_;
@@ -128,6 +157,23 @@ TEST_P(Rebake, ASequenceOfEditsGivesTheBytesOfAWholeBake) {
     level.edit_and_compare(&rng);
   }
   EXPECT_GT(level.reused(), 0u);
+}
+
+TEST_P(Rebake, WhatAToleranceKeepsFits) {
+  Edited level(GetParam());
+  Rng rng(0x701);
+  for (int i = 0; i < kSequence; ++i) {
+    SCOPED_TRACE("edit " + std::to_string(i));
+    level.edit_with_tolerance(0.5, &rng);
+  }
+}
+
+TEST(RebakeWithTolerance, KeepsCellsStale) {
+  Edited level({"yard", yard});
+  Rng rng(0x702);
+  uint64_t stale = 0;
+  for (int i = 0; i < 4; ++i) stale += level.edit_with_tolerance(0.5, &rng);
+  EXPECT_GT(stale, 0u);
 }
 
 INSTANTIATE_TEST_SUITE_P(Levels, Rebake, ::testing::ValuesIn(kLevels),

@@ -42,17 +42,22 @@ Matrix white_noise(Index rows, Index columns, uint64_t seed) {
   return out;
 }
 
+/// With σ = 1 m everywhere.
+Matrix averaged_by_one(const Matrix& transport, const std::vector<Vec3>& positions, const std::vector<Vec3>& normals) {
+  return average_with_neighbours(transport, positions, normals, std::vector<float>(positions.size(), 1.0f));
+}
+
 TEST(AverageWithNeighbours, KeepsWhatIsAlike) {
   const Floor floor = smooth_floor(9, 5);
   const Matrix same = Matrix::Constant(81, 5, 3.5f);
-  EXPECT_LT((average_with_neighbours(same, floor.positions, floor.normals, 1) - same).norm(), 1e-4f);
+  EXPECT_LT((averaged_by_one(same, floor.positions, floor.normals) - same).norm(), 1e-4f);
 }
 
 TEST(AverageWithNeighbours, NoiseGoesAndTransportStays) {
   const Floor floor = smooth_floor(20, 8);
   const Matrix n = white_noise(400, 8, 1);
   const auto share = [&](const Matrix& m) {
-    return average_with_neighbours(m, floor.positions, floor.normals, 1).norm() / m.norm();
+    return averaged_by_one(m, floor.positions, floor.normals).norm() / m.norm();
   };
   EXPECT_LT(share(n), 0.5f);
   EXPECT_GT(share(floor.transport), 0.97f);
@@ -63,8 +68,8 @@ TEST(AverageWithNeighbours, WeighsByDistanceAndTurn) {
   const std::vector<Vec3> positions{{0, 0, 0}, {far, 0, 0}, {0, 4, 0}, {0, 0, 0.01f}, {0, far, 0}};
   const std::vector<Vec3> normals{{0, 0, 1}, {0, 0, 1}, {0, 0, 1}, {0, 0, -1}, {0, std::sqrt(0.75f), 0.5f}};
   const Matrix each = Matrix::Identity(5, 5);
-  const Matrix s = average_with_neighbours(each, positions, normals, 1);
-  const float near = std::exp(-far * far / 2), total = 1 + near + 0.25f * near;
+  const Matrix s = averaged_by_one(each, positions, normals);
+  const float near = std::pow(1 - far * far / 9, 4.0f), total = 1 + near + 0.25f * near;
   EXPECT_NEAR(s(0, 0), kOwnShare + (1 - kOwnShare) / total, 1e-6f);
   EXPECT_NEAR(s(0, 1), (1 - kOwnShare) * near / total, 1e-6f);
   EXPECT_EQ(s(0, 2), 0);  // out of reach
@@ -73,12 +78,22 @@ TEST(AverageWithNeighbours, WeighsByDistanceAndTurn) {
   for (Index r = 0; r < 5; ++r) EXPECT_NEAR(s.row(r).sum(), 1, 1e-6f);
 }
 
+TEST(AverageWithNeighbours, EachReceiverHasItsOwnReach) {
+  const std::vector<Vec3> positions{{0, 0, 0}, {1, 0, 0}, {3, 0, 0}};
+  const std::vector<Vec3> normals(3, Vec3{0, 0, 1});
+  const Matrix s = average_with_neighbours(Matrix::Identity(3, 3), positions, normals, std::vector<float>{0.5f, 0, 2});
+  EXPECT_GT(s(0, 1), 0);
+  EXPECT_EQ(s(0, 2), 0);
+  EXPECT_EQ(s(1, 1), 1);
+  EXPECT_GT(s(2, 0), 0);
+}
+
 TEST(AverageWithNeighbours, DoesNotDependOnTheOrderOfReceivers) {
   const Floor floor = smooth_floor(6, 4);
   Matrix reversed = floor.transport.colwise().reverse();
   const std::vector<Vec3> positions(floor.positions.rbegin(), floor.positions.rend());
-  const Matrix forward = average_with_neighbours(floor.transport, floor.positions, floor.normals, 1);
-  const Matrix back = average_with_neighbours(reversed, positions, floor.normals, 1);
+  const Matrix forward = averaged_by_one(floor.transport, floor.positions, floor.normals);
+  const Matrix back = averaged_by_one(reversed, positions, floor.normals);
   EXPECT_LT((forward - Matrix(back.colwise().reverse())).cwiseAbs().maxCoeff(), 1e-6f);
 }
 
@@ -90,7 +105,7 @@ double error_of(const Floor& floor, const Matrix& noisy, bool averaged, int rank
   options.threshold = 0;
   options.min_receivers = 1000;
   const CompressedCell cell =
-      compress_cell(noisy, averaged ? average_with_neighbours(noisy, floor.positions, floor.normals, 1) : noisy,
+      compress_cell(noisy, averaged ? averaged_by_one(noisy, floor.positions, floor.normals) : noisy,
                     floor.positions, options);
   double error2 = 0;
   std::vector<float> lambda(static_cast<size_t>(noisy.cols()), 0.0f);

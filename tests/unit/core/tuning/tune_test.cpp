@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/bake/bake.h"
 #include "core/scene/builtin.h"
 #include "tests/support/baked_level.h"
 #include "tests/support/test_scenes.h"
@@ -76,13 +77,27 @@ TEST(Tune, ABudgetIsKept) {
   }
 }
 
+TEST(Tune, TheEstimateIsWhatABakeGives) {
+  const Level level = cornell();
+  for (const TuneTarget& target : {TuneTarget{0.15, 0}, TuneTarget{0, 1'000'000}}) {
+    const Tuning t = level.tuned(target);
+    const test::TemporaryFolder folder;
+    const BakeReport baked = value_or_die(bake(*level.tracer, t.chosen.params, folder.path() / "a.loom", {}));
+    EXPECT_NEAR(static_cast<double>(baked.bytes_total), t.chosen.bytes, 0.1 * t.chosen.bytes);
+    EXPECT_TRUE(target.bytes == 0 || baked.bytes_total <= target.bytes) << baked.bytes_total;
+  }
+}
+
 TEST(Tune, ABudgetThatNothingFitsSaysWhatWould) {
   const Level level = cornell();
   BakeParams request;
   request.texels_per_metre = 4;
   const auto t = tune(*level.tracer, request, {0, 1000}, {});
   EXPECT_EQ(t.status().code(), absl::StatusCode::kInvalidArgument);
-  EXPECT_NE(t.status().message().find("the least model of this level takes about"), std::string::npos) << t.status();
+  const std::string message(t.status().message()), before = "the least model of this level takes about ";
+  ASSERT_NE(message.find(before), std::string::npos) << message;
+  const uint64_t named = std::stoull(message.substr(message.find(before) + before.size()));
+  EXPECT_LE(level.tuned({0, named}).chosen.bytes, static_cast<double>(named));
 }
 
 TEST(Tune, DependsOnNeitherThreadsNorTheLevelsLights) {
@@ -95,13 +110,20 @@ TEST(Tune, DependsOnNeitherThreadsNorTheLevelsLights) {
   EXPECT_EQ(one.chosen.bytes, four.chosen.bytes);
 }
 
-TEST(Tune, StopsWhenCancelled) {
+TEST(Tune, StopsWhenCancelledInAnyStage) {
   const Level level = cornell();
-  CancelFlag cancel;
-  cancel.cancel();
-  BakeControl control;
-  control.cancel = &cancel;
-  EXPECT_EQ(tune(*level.tracer, BakeParams(), {0.1, 0}, control).status().code(), absl::StatusCode::kCancelled);
+  BakeParams request;
+  request.texels_per_metre = 3;
+  for (const std::string when : {"", "parameters: truth", "parameters: probes", "parameters: rank"}) {
+    CancelFlag cancel;
+    BakeControl control;
+    control.cancel = &cancel;
+    control.progress = [&](const std::string& stage, uint64_t, uint64_t, uint64_t) {
+      if (stage == when) cancel.cancel();
+    };
+    if (when.empty()) cancel.cancel();
+    EXPECT_EQ(tune(*level.tracer, request, {0.15, 0}, control).status().code(), absl::StatusCode::kCancelled) << when;
+  }
 }
 
 }  // namespace
