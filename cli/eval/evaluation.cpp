@@ -58,8 +58,8 @@ bool lightmaps_missing(const Request& request, const Method& method, size_t rigs
 
 /// One round: prepares the variant once more, and the first time lights and judges it.
 absl::Status measure(LitLevel* level, const Request& request, const Method& method, const Variant& variant,
-                     const std::vector<Truth>& truths, bool keep_lightmaps,
-                     const std::filesystem::path& path, Run* run) {
+                     const std::vector<Truth>& truths, bool keep_lightmaps, const std::filesystem::path& path,
+                     Run* run) {
   const std::filesystem::path scratch = std::filesystem::path(request.folder) / ("scratch-" + random_id());
   struct Remove {
     const std::filesystem::path& path;

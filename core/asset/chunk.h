@@ -44,10 +44,10 @@ struct TexelRef {
 struct CellChunk {
   struct Cluster {
     uint32_t first_receiver = 0, receivers = 0;
-    std::vector<uint32_t> probes;      ///< P indices into the cell's probe list
-    std::vector<float> correction;     ///< K: projection[k]·u, u = sh_uniform of every probe
-    std::vector<Half> projection;      ///< K × P × sh_stride, rows Σ_c·V_cᵀ, padding 0; singular values descend (those
-                                       ///< of averaged rows, if V is theirs)
+    std::vector<uint32_t> probes;   ///< P indices into the cell's probe list
+    std::vector<float> correction;  ///< K: projection[k]·u, u = sh_uniform of every probe
+    std::vector<Half> projection;  ///< K × P × sh_stride, rows Σ_c·V_cᵀ, padding 0; singular values descend (those
+                                   ///< of averaged rows, if V is theirs)
     std::vector<Half> reconstruction;  ///< K × receivers rounded up to 8, columns of U_c, padding 0
     Aabb bounds;
     float error = 0;

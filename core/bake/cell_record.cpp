@@ -52,8 +52,7 @@ std::vector<uint8_t> encode_cell_record(const CellRecord& c) {
   ByteWriter w;
   w.value(Header{kMagic, kVersion, static_cast<uint32_t>(c.probes.size()), static_cast<uint32_t>(c.clusters.size()),
                  c.key, c.chunk, c.bounds.lo, c.bounds.hi, c.gather_rays, c.unseen, c.error, c.coefficients,
-                 c.bytes_projection, c.bytes_reconstruction, c.stale,
-                 static_cast<uint32_t>(c.near.size())});
+                 c.bytes_projection, c.bytes_reconstruction, c.stale, static_cast<uint32_t>(c.near.size())});
   w.array(c.probes);
   w.array(c.clusters);
   for (const NearSurface& near : c.near) {

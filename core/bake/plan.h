@@ -59,7 +59,8 @@ absl::Status check_params(const BakeParams& request);
 /// Errors: parameters out of range, a scene without receivers, cancellation.
 absl::StatusOr<Plan> make_plan(const RayTracer& tracer, const BakeParams& request, const BakeControl& control);
 
-/// The first half of make_plan: a plan with receivers, and neither probes nor cells. Its spacing may be changed.
+/// The first half of make_plan: a plan with receivers and a grid, and neither probes nor cells. Its spacing may be changed before
+/// the other half.
 absl::StatusOr<Plan> find_ground(const RayTracer& tracer, const BakeParams& request, const BakeControl& control);
 /// The other half.
 absl::StatusOr<Plan> finish_plan(const RayTracer& tracer, Plan ground, const BakeControl& control);

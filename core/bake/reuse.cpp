@@ -31,7 +31,8 @@ bool names_receivers(const CellRecord& cell, const Plan& plan, const std::map<Di
     const auto it = objects.find(near.object.id);
     if (it == objects.end()) return false;
     const LightmapUv& uv = plan.layout.uv[it->second];
-    return static_cast<uint32_t>(uv.width) == near.object.width && static_cast<uint32_t>(uv.height) == near.object.height &&
+    return static_cast<uint32_t>(uv.width) == near.object.width &&
+           static_cast<uint32_t>(uv.height) == near.object.height &&
            std::all_of(near.keys.begin(), near.keys.end(),
                        [&](uint32_t key) { return plan.receivers.find(it->second, key) != Receivers::kNone; });
   });

@@ -202,7 +202,8 @@ CellTask make_cell_task(const Plan& plan, const Scene& scene, const PlannedCell&
     task.receivers.push_back(std::move(point));
     if (plan.params.average > 0) {
       const uint32_t triangle = plan.receivers.grids[r.object].texels[r.texel].triangle;
-      task.sigma.push_back(plan.params.average * texel_size(scene.objects[r.object], plan.layout.uv[r.object], triangle));
+      task.sigma.push_back(plan.params.average *
+                           texel_size(scene.objects[r.object], plan.layout.uv[r.object], triangle));
     }
     task.texels.push_back({slot_of.at(r.object), r.key});
   }

@@ -18,7 +18,7 @@
 namespace lightloom {
 
 /// Changes with any change of a baseline's E, bytes or work per frame: what is remembered of them does not hold then.
-inline constexpr std::string_view kBaselinesVersion = "1";
+inline constexpr std::string_view kBaselinesVersion = "2";
 
 /// Milliseconds of a frame's passes, summed over the frames.
 struct FrameTimes {

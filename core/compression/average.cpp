@@ -26,7 +26,8 @@ Matrix average_with_neighbours(const Matrix& transport, std::span<const Vec3> po
     }
     sum.setZero();
     float weights = 0;
-    auto at = std::lower_bound(by_x.begin(), by_x.end(), x - reach, [&](uint32_t b, float least) { return positions[b].x < least; });
+    auto at = std::lower_bound(by_x.begin(), by_x.end(), x - reach,
+                               [&](uint32_t b, float least) { return positions[b].x < least; });
     for (; at != by_x.end() && positions[*at].x <= x + reach; ++at) {
       const uint32_t b = *at;
       const Vec3 apart = positions[b] - positions[a];

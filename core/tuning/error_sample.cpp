@@ -40,7 +40,7 @@ double relative(const std::vector<double>& error2, const std::vector<double>& en
 
 double ProbeErrors::near_texels_by(int rays) const {
   const size_t i = rays < kNearRays[1] ? 0 : 1;  // of the pieces between 128 and 256, 256 and 512
-  double doublings = 0;                         // from its begin; log2() would round as the C library likes
+  double doublings = 0;                          // from its begin; log2() would round as the C library likes
   for (int n = kNearRays[i]; n < rays; n *= 2) ++doublings;
   for (int n = kNearRays[i]; n > rays; n /= 2) --doublings;
   return std::max(0.0, near_texels[i] + doublings * (near_texels[i + 1] - near_texels[i]));

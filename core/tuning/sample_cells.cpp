@@ -179,8 +179,9 @@ absl::StatusOr<CompressionCost> SampleCells::compress(const CompressionChoice& c
     options.relight_rays = static_cast<uint32_t>(choice.relight_rays);
     options.seed = cell.seed;
     const Matrix transport = narrowed(cell.transport[of_rays], choice.order);
-    const CompressedCell compressed = compress_cell(
-        transport, average_with_neighbours(transport, cell.positions, cell.normals, cell.sigma), cell.positions, options);
+    const CompressedCell compressed =
+        compress_cell(transport, average_with_neighbours(transport, cell.positions, cell.normals, cell.sigma),
+                      cell.positions, options);
     s.receivers = static_cast<double>(cell.positions.size());
     s.other = s.receivers * sizeof(uint16_t);
     for (const CellChunk::Cluster& cluster : compressed.clusters) {

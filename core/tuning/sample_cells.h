@@ -42,7 +42,7 @@ class SampleCells {
 
   struct Cell {
     std::vector<Vec3> positions, normals;
-    std::vector<float> sigma;  // CellTask::sigma
+    std::vector<float> sigma;                // CellTask::sigma
     Matrix transport[kRayCounts];            // of the widest order, by kRays
     std::vector<double> near[kRayCounts];    // E from near fields: receivers × lights, by kRays
     std::vector<float> judged;               // E: receivers × judging batches × lights × orders

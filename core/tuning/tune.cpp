@@ -27,13 +27,13 @@ constexpr int kRelightRays[] = {512, 1024, 2048, 4096, 8192};
 constexpr double kMiddle = 1, kTight = 0.5, kLoose[] = {2, 1.4};
 constexpr double kFalling = 0.95;
 constexpr int kRanks[] = {32, 64};
-constexpr double kOfBudget = 0.95;                         // few cells tell how well a level compresses
-constexpr float kAverage = 1;                              // texels
-constexpr size_t kExact = 3;                               // models that are looked at closely
+constexpr double kOfBudget = 0.95;  // few cells tell how well a level compresses
+constexpr float kAverage = 1;       // texels
+constexpr size_t kExact = 3;        // models that are looked at closely
 // Per receiver: its texel in the surface; its name, and how many near texels it has.
 constexpr double kSurfaceBytes = 24, kReceiverBytes = 10;
-constexpr double kProbeBytes = 200;                        // besides its rays
-constexpr int kTypicalOrder = 6;                           // with which compression is tried before the order is known
+constexpr double kProbeBytes = 200;  // besides its rays
+constexpr int kTypicalOrder = 6;     // with which compression is tried before the order is known
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 float spacing_of(float base, int step) {

@@ -312,9 +312,10 @@ typedef struct lightloom_shadow_view {
 /* How much one frame may do. All zero (but struct_size): everything that changed, at once. */
 typedef struct lightloom_update_options {
   uint32_t struct_size;
-  uint32_t max_probes;   /* that are relit in a frame, in turn; 0: all that saw a change */
-  uint32_t max_cells;    /* whose E is computed in a frame, in turn; 0: all with a relit probe or a near field that changed */
-  float epsilon;         /* relative change of a surface element's radiance that counts; below 2^-19 none does */
+  uint32_t max_probes; /* that are relit in a frame, in turn; 0: all that saw a change */
+  uint32_t
+      max_cells; /* whose E is computed in a frame, in turn; 0: all with a relit probe or a near field that changed */
+  float epsilon; /* relative change of a surface element's radiance that counts; below 2^-19 none does */
   float epsilon_floor;   /* radiance below which a change is compared with epsilon * epsilon_floor instead */
   float smoothing;       /* E goes this share of the way to its new value each frame, (0, 1]; 0 means 1: at once */
   uint64_t upload_bytes; /* that a frame copies at most; 0: what the staging buffer holds */

@@ -6,7 +6,7 @@
 namespace lightloom {
 namespace {
 
-constexpr uint64_t kPage = 4096;  // of a table: fewer bytes are not worth a copy command of their own
+constexpr uint64_t kPage = 256;  // of a table: fewer bytes are not worth a copy command of their own
 
 }  // namespace
 

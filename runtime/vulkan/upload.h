@@ -91,7 +91,8 @@ class ShadowTable {
  private:
   Buffer device_;
   std::pmr::vector<uint8_t> host_;
-  std::pmr::vector<bool> pending_;  // per page: the device does not have all of it. Pages, so that touch() needs no memory
+  std::pmr::vector<bool>
+      pending_;  // per page: the device does not have all of it. Pages, so that touch() needs no memory
   uint64_t pending_bytes_ = 0;
   uint64_t page_ = 4;
   uint8_t value_ = 0;

@@ -181,7 +181,8 @@ TEST_P(HostileAsset, InfinitiesThatCancelDoNotMakeItNan) {
     for (size_t k = 0; k < c->correction.size(); ++k) {
       c->correction[k] = 3e38f;
       const size_t column = c->reconstruction.size() / c->correction.size();
-      for (size_t r = 0; r < column; ++r) c->reconstruction[k * column + r] = float_to_half(k % 2 == 0 ? 100.0f : -100.0f);
+      for (size_t r = 0; r < column; ++r)
+        c->reconstruction[k * column + r] = float_to_half(k % 2 == 0 ? 100.0f : -100.0f);
     }
   });
 }

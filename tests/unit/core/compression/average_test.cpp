@@ -104,9 +104,8 @@ double error_of(const Floor& floor, const Matrix& noisy, bool averaged, int rank
   options.max_rank = rank;
   options.threshold = 0;
   options.min_receivers = 1000;
-  const CompressedCell cell =
-      compress_cell(noisy, averaged ? averaged_by_one(noisy, floor.positions, floor.normals) : noisy,
-                    floor.positions, options);
+  const CompressedCell cell = compress_cell(
+      noisy, averaged ? averaged_by_one(noisy, floor.positions, floor.normals) : noisy, floor.positions, options);
   double error2 = 0;
   std::vector<float> lambda(static_cast<size_t>(noisy.cols()), 0.0f);
   for (size_t c = 0; c < lambda.size(); ++c) {

@@ -190,6 +190,7 @@ TEST(SimdRuntime, StatsCountBytesAndTimes) {
       projection += 2 * c.projection.size();
       reconstruction += 2 * c.reconstruction.size();
     }
+    reconstruction += kNearTexelBytes * cell.chunk.near_texels.size();
   }
   EXPECT_EQ(stats.frames, 1u);
   EXPECT_EQ(stats.relight_bytes, 24u * 200 * 4);
