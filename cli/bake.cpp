@@ -236,7 +236,9 @@ absl::Status run(const Options& o) {
     bar.finish();
     const Outlook outlook(session.plan(), reuse);
     if (o.farm.json && o.dry_run) {
-      print_json(outlook.to_json(o.explain));
+      nlohmann::json out = outlook.to_json(o.explain);
+      if (tuning) out["tuning"] = to_json(*tuning);
+      print_json(out);
     } else if (!o.farm.json) {
       outlook.print(o.explain);
     }

@@ -12,6 +12,7 @@
 #include <system_error>
 
 #include "core/base/file.h"
+#include "core/scene/gltf_container.h"
 
 namespace lightloom {
 namespace {
@@ -54,9 +55,11 @@ absl::Status missing(const std::string& path, const std::string& mend) {
 std::vector<std::string> linked_files(const std::string& gltf) {
   constexpr uintmax_t kMaxBytes = uintmax_t{256} << 20;
   std::error_code error;
-  if (!gltf.ends_with(".gltf") || fs::file_size(gltf, error) > kMaxBytes || error) return {};
+  if (!(gltf.ends_with(".gltf") || gltf.ends_with(".glb")) || fs::file_size(gltf, error) > kMaxBytes || error)
+    return {};
   const auto bytes = read_file(gltf);
-  if (!bytes.ok()) return {};
+  const auto parts = bytes.ok() ? gltf_parts(*bytes) : bytes.status();
+  if (!parts.ok()) return {};
   using Json = nlohmann::json;
   std::vector<std::string> files;
   std::string key;
@@ -68,7 +71,7 @@ std::vector<std::string> linked_files(const std::string& gltf) {
     }
     return event != Json::parse_event_t::value;  // nothing is kept
   };
-  [[maybe_unused]] const Json nothing = Json::parse(bytes->begin(), bytes->end(), collect, /*allow_exceptions=*/false);
+  [[maybe_unused]] const Json nothing = Json::parse(parts->json, collect, /*allow_exceptions=*/false);
   return files;
 }
 

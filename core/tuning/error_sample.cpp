@@ -12,8 +12,7 @@ namespace lightloom {
 namespace {
 
 constexpr int kLights = 16;
-constexpr uint64_t kSeed = 0x7a3e;                  // of nothing else
-constexpr uint32_t kBatches = 2, kBatchRays = 128;  // their spread tells the noise, which is not the model's
+constexpr uint64_t kSeed = 0x7a3e;                                // of nothing else
 constexpr uint32_t kRelightRays = 1024, kOtherRelightRays = 987;  // two lattices, so that their difference is noise
 constexpr size_t kLeastReceivers = 512, kMostReceivers = 4096, kShare = 14;
 
@@ -36,7 +35,113 @@ double relative(const std::vector<double>& error2, const std::vector<double>& en
   return mean * mean * mean * mean;
 }
 
+constexpr size_t J = kMaxShCount;
+
+/// λ of a plan's probes: lights × J each. `other`: by another number of relight rays, where it is known.
+struct ProbeLight {
+  std::vector<std::vector<float>> lambda, other;
+};
+
 }  // namespace
+
+/// What the probes and near fields of a plan make of one receiver's E, from the hits of batches of rays.
+class ErrorSample::Look {
+ public:
+  Look(const ErrorSample& sample, const ProbeLight& light, const CellTask& task)
+      : sample_(sample),
+        light_(light),
+        task_(task),
+        lights_(sample.lights().count()),
+        row_(task.probes.size() * J),
+        model_(kReachCount * lights_ * kOrders * kBatches),
+        near_(lights_),
+        unseen_(kReachCount),
+        relight_(kReachCount * lights_) {}
+
+  /// Batch `b`, which the gatherer has shot. From far to near: each smaller near field leaves a ring more to the probes, and
+  /// the larger ones have it.
+  void add(uint32_t b, std::span<const float> reach, Gatherer* gatherer) {
+    std::fill(row_.begin(), row_.end(), 0.0f);
+    uint64_t unseen_rays = 0;
+    for (size_t k = kReachCount; k-- > 0;) {
+      unseen_rays += gatherer->add_ring(reach[k], reach[k + 1], row_).unseen;
+      unseen_[k] += static_cast<double>(unseen_rays) / kBatchRays / kBatches;
+      std::fill(near_.begin(), near_.end(), 0.0);
+      sample_.add_near_field(gatherer->near(), kBatchRays, near_);
+      for (size_t larger = k + 1; larger < kReachCount; ++larger) {
+        for (const NearTexel& n : gatherer->near()) texels_[larger].insert(n.receiver);
+        for (size_t l = 0; l < lights_; ++l) {
+          for (size_t n = 0; n < kOrders; ++n) model(larger, l, n, b) += near_[l];
+        }
+      }
+      for (size_t p = 0; p < task_.probes.size(); ++p) add_probe(k, b, p);
+    }
+    for (size_t k = 0; k < kReachCount; ++k) near_texels_[k][b] = static_cast<uint32_t>(texels_[k].size());
+  }
+
+  const NearTexels& near_texels() const { return near_texels_; }
+
+  Sums sums(size_t k, size_t l, const std::array<double, kBatches>& truth) {
+    Sums out;
+    double of_finest = 0;
+    for (size_t n = 0; n < kOrders; ++n) {
+      double mean = 0, square = 0, sum = 0;
+      for (uint32_t b = 0; b < kBatches; ++b) {
+        const double e = model(k, l, n, b), d = e - truth[b];
+        sum += e / kBatches;
+        mean += d / kBatches;
+        square += d * d;
+      }
+      const double variance = (square - kBatches * mean * mean) / (kBatches - 1);
+      out.error2[n] = mean * mean - variance / kBatches;
+      of_finest = sum;
+    }
+    out.relight2 = relight_[k * lights_ + l];
+    // What no probe sees is taken to be as bright as what is seen.
+    const double unseen = unseen_[k] < 1 ? of_finest * unseen_[k] / (1 - unseen_[k]) : truth[0];
+    out.unseen2 = unseen * unseen;
+    return out;
+  }
+
+ private:
+  double& model(size_t k, size_t l, size_t n, size_t b) {
+    return model_[((k * lights_ + l) * kOrders + n) * kBatches + b];
+  }
+
+  /// What probe p adds by the row as it is.
+  void add_probe(size_t k, uint32_t b, size_t p) {
+    const float* alpha = &row_[p * J];
+    if (std::all_of(alpha, alpha + J, [](float a) { return a == 0; })) return;
+    const auto& second = light_.other[task_.probe_ids[p]];
+    for (size_t l = 0; l < lights_; ++l) {
+      const float* lambda = &light_.lambda[task_.probe_ids[p]][l * J];
+      double band = 0, difference = 0;
+      for (size_t n = 0; n < kOrders; ++n) {
+        for (size_t j = n * n; j < (n + 1) * (n + 1); ++j) {
+          band += static_cast<double>(alpha[j]) * static_cast<double>(lambda[j]);
+        }
+        model(k, l, n, b) += band;
+      }
+      if (second.empty()) continue;
+      for (size_t j = 0; j < J; ++j) {
+        difference +=
+            static_cast<double>(alpha[j]) * (static_cast<double>(lambda[j]) - static_cast<double>(second[l * J + j]));
+      }
+      // Half of the squared difference is one lattice's variance; a quarter of the probes stand for all.
+      relight_[k * lights_ + l] += 4 * 0.5 * difference * difference / kBatches;
+    }
+  }
+
+  const ErrorSample& sample_;
+  const ProbeLight& light_;
+  const CellTask& task_;
+  const size_t lights_;
+  std::vector<float> row_;
+  std::vector<double> model_;  // E: reaches × lights × orders × batches
+  std::vector<double> near_, unseen_, relight_;
+  std::array<std::set<uint32_t>, kReachCount> texels_;
+  NearTexels near_texels_{};
+};
 
 double ProbeErrors::near_texels_by(int rays) const {
   const size_t i = rays < kNearRays[1] ? 0 : 1;  // of the pieces between 128 and 256, 256 and 512
@@ -134,7 +239,6 @@ double ErrorSample::typical_energy() const {
 }
 
 absl::StatusOr<ErrorsByReach> ErrorSample::measure(const Plan& plan, const Parallel& how) const {
-  constexpr size_t J = kMaxShCount, kOrders = kMaxShOrder + 1, kReachCount = kReaches.size();
   static_assert(kBatchRays == ProbeErrors::kNearRays[0] && kBatches * kBatchRays == ProbeErrors::kNearRays[1]);
   Plan wide = plan;  // all orders at once: a lower one reads a part of the same coefficients
   wide.params.order = kMaxShOrder;
@@ -142,114 +246,55 @@ absl::StatusOr<ErrorsByReach> ErrorSample::measure(const Plan& plan, const Paral
   std::array<float, kReachCount + 1> reach{};
   for (size_t k = 0; k < kReachCount; ++k) reach[k] = kReaches[k] * plan.params.near_field;
   reach[kReachCount] = std::numeric_limits<float>::infinity();
-  const Scene& scene = tracer_.scene();
   const size_t lights = lights_.count(), count = receivers_.size();
 
   const std::vector<Vec3> positions = positions_of(plan.placement.probes);
   VisibilityCache cache(tracer_, plan.layout, plan.receivers.grids, positions);
   Parallel quiet = how;
   quiet.progress = nullptr;
-  std::vector<std::vector<float>> lambda(positions.size()), other(positions.size());
+  ProbeLight light{std::vector<std::vector<float>>(positions.size()),
+                   std::vector<std::vector<float>>(positions.size())};
   const bool lit = parallel_for(positions.size(), quiet, [&](uint64_t p) {
-    lambda[p] = probe_radiance(positions[p], kRelightRays, kMaxShOrder);
+    light.lambda[p] = probe_radiance(positions[p], kRelightRays, kMaxShOrder);
     // Every fourth probe pays for the second lattice: enough to know the noise.
-    if (p % 4 == 0) other[p] = probe_radiance(positions[p], kOtherRelightRays, kMaxShOrder);
+    if (p % 4 == 0) light.other[p] = probe_radiance(positions[p], kOtherRelightRays, kMaxShOrder);
   });
   if (!lit) return cancelled();
 
-  // Per receiver, reach and light: the error by order (without the noise of its own rays), that of a batch, unseen, of relight
-  // rays.
-  struct Sums {
-    std::array<double, kOrders> error2{};
-    double unseen2 = 0, relight2 = 0;
-  };
   std::vector<Sums> sums(count * kReachCount * lights);
-  std::vector<std::array<std::array<uint32_t, kBatches>, kReachCount>> near_texels(count);
+  std::vector<NearTexels> near_texels(count);
   const bool done = parallel_for(count, how, [&](uint64_t i) {
     const Receiver& r = ground_.receivers.all[receivers_[i]];
     const uint32_t own = plan.receivers.find(r.object, r.key);
     if (own == Receivers::kNone) return;  // a back side that this plan drops
-    const CellTask task = make_cell_task(wide, scene, cell_of_one(own));
+    const CellTask task = make_cell_task(wide, tracer_.scene(), cell_of_one(own));
     Gatherer gatherer(tracer_, &cache, &search_, {task.probes, task.probe_ids},
                       {kMaxShOrder, kBatchRays, true, reach[kReachCount - 1], true});
-    std::vector<float> row(task.probes.size() * J);
-    std::vector<double> model(kReachCount * lights * kOrders * kBatches), near(lights);
-    std::vector<double> unseen(kReachCount), relight(kReachCount * lights);
-    std::array<std::set<uint32_t>, kReachCount> texels;
+    Look look(*this, light, task);
     for (uint32_t b = 0; b < kBatches; ++b) {
-      const auto of = [&](size_t k, size_t l, size_t n) -> double& {
-        return model[((k * lights + l) * kOrders + n) * kBatches + b];
-      };
-      std::fill(row.begin(), row.end(), 0.0f);
       GatherPoint point = task.receivers.front();
       point.seed = batch_seed(r.seed, b);
       gatherer.shoot(point);
-      uint64_t unseen_rays = 0;
-      // From far to near: each smaller near field leaves a ring more to the probes, and the larger ones have it.
-      for (size_t k = kReachCount; k-- > 0;) {
-        unseen_rays += gatherer.add_ring(reach[k], reach[k + 1], row).unseen;
-        std::fill(near.begin(), near.end(), 0.0);
-        add_near_field(gatherer.near(), kBatchRays, near);
-        unseen[k] += static_cast<double>(unseen_rays) / kBatchRays / kBatches;
-        for (size_t larger = k + 1; larger < kReachCount; ++larger) {
-          for (const NearTexel& n : gatherer.near()) texels[larger].insert(n.receiver);
-          for (size_t l = 0; l < lights; ++l) {
-            for (size_t n = 0; n < kOrders; ++n) of(larger, l, n) += near[l];
-          }
-        }
-        for (size_t p = 0; p < task.probes.size(); ++p) {
-          const float* alpha = &row[p * J];
-          if (std::all_of(alpha, alpha + J, [](float a) { return a == 0; })) continue;
-          const auto& second = other[task.probe_ids[p]];
-          for (size_t l = 0; l < lights; ++l) {
-            const float* probe = &lambda[task.probe_ids[p]][l * J];
-            double band = 0, difference = 0;
-            for (int n = 0; n <= kMaxShOrder; ++n) {
-              for (int j = n * n; j < (n + 1) * (n + 1); ++j)
-                band += static_cast<double>(alpha[j]) * static_cast<double>(probe[j]);
-              of(k, l, static_cast<size_t>(n)) += band;
-            }
-            if (second.empty()) continue;
-            for (size_t j = 0; j < J; ++j) {
-              difference += static_cast<double>(alpha[j]) *
-                            (static_cast<double>(probe[j]) - static_cast<double>(second[l * J + j]));
-            }
-            // Half of the squared difference is one lattice's variance; a quarter of the probes stand for all.
-            relight[k * lights + l] += 4 * 0.5 * difference * difference / kBatches;
-          }
-        }
-      }
-      for (size_t k = 0; k < kReachCount; ++k) {
-        const auto size = static_cast<uint32_t>(texels[k].size());
-        near_texels[i][k][b] = size;
-      }
+      look.add(b, reach, &gatherer);
     }
+    near_texels[i] = look.near_texels();
     for (size_t k = 0; k < kReachCount; ++k) {
       for (size_t l = 0; l < lights; ++l) {
-        Sums& s = sums[(i * kReachCount + k) * lights + l];
-        const auto truth = [&](uint32_t b) { return static_cast<double>(truth_[(i * kBatches + b) * lights + l]); };
-        const double* by_order = &model[(k * lights + l) * kOrders * kBatches];
-        double of_finest = 0;
-        for (size_t n = 0; n < kOrders; ++n) {
-          double mean = 0, square = 0, sum = 0;
-          for (uint32_t b = 0; b < kBatches; ++b) {
-            const double e = by_order[n * kBatches + b], d = e - truth(b);
-            sum += e / kBatches;
-            mean += d / kBatches;
-            square += d * d;
-          }
-          const double variance = (square - kBatches * mean * mean) / (kBatches - 1);
-          s.error2[n] = mean * mean - variance / kBatches;
-          of_finest = sum;
+        std::array<double, kBatches> truth;
+        for (uint32_t b = 0; b < kBatches; ++b) {
+          truth[b] = static_cast<double>(truth_[(i * kBatches + b) * lights + l]);
         }
-        s.relight2 = relight[k * lights + l];
-        // What no probe sees is taken to be as bright as what is seen.
-        s.unseen2 = unseen[k] < 1 ? std::pow(of_finest * unseen[k] / (1 - unseen[k]), 2) : std::pow(truth(0), 2);
+        sums[(i * kReachCount + k) * lights + l] = look.sums(k, l, truth);
       }
     }
   });
   if (!done) return cancelled();
+  return mean_errors(sums, near_texels);
+}
 
+ErrorsByReach ErrorSample::mean_errors(const std::vector<Sums>& sums,
+                                       const std::vector<NearTexels>& near_texels) const {
+  const size_t lights = lights_.count(), count = receivers_.size();
   ErrorsByReach all;
   for (size_t k = 0; k < kReachCount; ++k) {
     ProbeErrors& out = all[k];

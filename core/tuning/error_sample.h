@@ -50,7 +50,19 @@ class ErrorSample {
   double typical_energy() const;
 
  private:
+  static constexpr size_t kOrders = kMaxShOrder + 1, kReachCount = kReaches.size();
+  static constexpr uint32_t kBatchRays = 128, kBatches = 2;  ///< their spread tells the noise, which is not the model's
+  /// Of one receiver, reach and light, squared: the error by order, without the noise of its own rays; what is unseen; that of
+  /// relight rays.
+  struct Sums {
+    std::array<double, kOrders> error2{};
+    double unseen2 = 0, relight2 = 0;
+  };
+  using NearTexels = std::array<std::array<uint32_t, kBatches>, kReachCount>;  ///< of one receiver, by batches so far
+  class Look;
+
   ErrorSample(const RayTracer& tracer, const Plan& ground);
+  ErrorsByReach mean_errors(const std::vector<Sums>& sums, const std::vector<NearTexels>& near_texels) const;
   /// What comes along a ray, by light; empty: nothing.
   std::span<const float> radiance(Vec3 origin, Vec3 direction) const;
 

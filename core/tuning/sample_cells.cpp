@@ -155,6 +155,9 @@ absl::StatusOr<SampleCells> SampleCells::create(const RayTracer& tracer, const P
     }
   });
   if (!gathered) return cancelled();
+  out.dark_ = std::all_of(out.cells_.begin(), out.cells_.end(), [](const Cell& cell) {
+    return std::all_of(cell.judged.begin(), cell.judged.end(), [](float e) { return e == 0; });
+  });
   return out;
 }
 
@@ -184,6 +187,8 @@ absl::StatusOr<CompressionCost> SampleCells::compress(const CompressionChoice& c
                       cell.positions, options);
     s.receivers = static_cast<double>(cell.positions.size());
     s.other = s.receivers * sizeof(uint16_t);
+    std::vector<std::vector<float>> lambdas;
+    for (const std::vector<float>& wide : cell.lambda) lambdas.push_back(narrowed(wide, choice.order));
     for (const CellChunk::Cluster& cluster : compressed.clusters) {
       s.projection += static_cast<double>(cluster.projection.size() * sizeof(Half));
       s.other +=
@@ -195,9 +200,8 @@ absl::StatusOr<CompressionCost> SampleCells::compress(const CompressionChoice& c
       for (Half& h : coarse.reconstruction) h = rounded_further(h);
       for (size_t l = 0; l < lights_; ++l) {
         if (!(weight_[l] > 0)) continue;
-        const std::vector<float> lambda = narrowed(cell.lambda[l], choice.order);
-        const std::vector<float> e = decode_cluster(cluster, compressed.uniform, choice.order, lambda);
-        const std::vector<float> rough = decode_cluster(coarse, compressed.uniform, choice.order, lambda);
+        const std::vector<float> e = decode_cluster(cluster, compressed.uniform, choice.order, lambdas[l]);
+        const std::vector<float> rough = decode_cluster(coarse, compressed.uniform, choice.order, lambdas[l]);
         for (size_t r = 0; r < e.size(); ++r) {
           const size_t receiver = compressed.order[cluster.first_receiver + r];
           double mean = 0, square = 0;

@@ -33,6 +33,8 @@ class SampleCells {
                                             const Parallel& how);
 
   static constexpr int kRays[] = {64, 128, 256, 512, 1024};  ///< that can be asked for
+  /// No sample light reaches them: errors say nothing, and are 0.
+  bool dark() const { return dark_; }
   /// Error: cancellation.
   absl::StatusOr<CompressionCost> compress(const CompressionChoice& choice, const Parallel& how) const;
 
@@ -51,6 +53,7 @@ class SampleCells {
   };
   std::vector<Cell> cells_;
   size_t lights_ = 0;
+  bool dark_ = false;
   std::vector<double> weight_;  // per light, of a squared error
 };
 

@@ -30,6 +30,7 @@ constexpr int kRanks[] = {32, 64};
 constexpr double kOfBudget = 0.95;  // few cells tell how well a level compresses
 constexpr float kAverage = 1;       // texels
 constexpr size_t kExact = 3;        // models that are looked at closely
+constexpr size_t kKeptCells = 3;    // spacings whose sampled cells are kept
 // Per receiver: its texel in the surface; its name, and how many near texels it has.
 constexpr double kSurfaceBytes = 24, kReceiverBytes = 10;
 constexpr double kProbeBytes = 200;  // besides its rays
@@ -359,9 +360,19 @@ class Tuner {
     if (!cells_.contains(step)) {
       LL_ASSIGN_OR_RETURN(SampleCells made, SampleCells::create(tracer_, trials_.at(step).plan, *sample_, how));
       cells_.emplace(step, std::move(made));
+      // They are large, and neighbours are asked for next.
+      if (cells_.size() > kKeptCells) {
+        const bool first_is_farther = step - cells_.begin()->first > cells_.rbegin()->first - step;
+        cells_.erase(first_is_farther ? cells_.begin() : std::prev(cells_.end()));
+      }
     }
     const SampleCells& cells = cells_.at(step);
     Compressed best;
+    if (cells.dark()) {  // no light says how much is enough
+      best.choice.order = order;
+      LL_ASSIGN_OR_RETURN(best.cost, cells.compress(best.choice, how));
+      return best;
+    }
     best.cost.error = kInfinity;
     const auto enough = [&] { return best.cost.error <= error; };
     // Whether it is better, or enough.
@@ -388,6 +399,7 @@ class Tuner {
         LL_ASSIGN_OR_RETURN(better, attempt(choice, kMiddle));
       }
       if (enough()) break;
+      if (best.choice.max_rank != rank) continue;  // more columns were no better
       LL_RETURN_IF_ERROR(attempt(best.choice, kTight).status());
       if (enough()) break;
     }
