@@ -162,7 +162,6 @@ absl::StatusOr<Plan> find_ground(const RayTracer& tracer, const BakeParams& requ
   LL_RETURN_IF_ERROR(check_place(scene.bounds(), plan.layout.texels_per_metre));
   if (plan.layout.mode == LayoutMode::kScene) plan.params.lightmap_size = plan.layout.width;
 
-  plan.grid = WorldGrid::around(scene.bounds(), plan.params.spacing);
   const Stopwatch receivers_watch;
   LL_ASSIGN_OR_RETURN(plan.receivers, find_receivers(tracer, plan.layout, control.stage("receivers")));
   plan.seconds_receivers = receivers_watch.seconds();
@@ -171,6 +170,7 @@ absl::StatusOr<Plan> find_ground(const RayTracer& tracer, const BakeParams& requ
         "no lightmap texel lies in open space: give the level static objects that receive a lightmap, and check that "
         "its normals do not all point into solids");
   }
+  plan.grid = WorldGrid::around(scene.bounds(), plan.params.spacing);
   return plan;
 }
 
