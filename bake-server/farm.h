@@ -22,12 +22,12 @@ struct FarmLimits {
 
 class Farm {
  public:
-  /// FOLDER/store.db, FOLDER/blobs, FOLDER/lock. Errors: another server has the folder, it cannot be used, its database is
-  /// damaged or of a newer release.
+  /// FOLDER/blobs, and FOLDER/store.db and FOLDER/lock, unless `database` is a PostgreSQL address: then other servers may use
+  /// both, too. Errors: another server has the folder, it or the database cannot be used, is damaged or of a newer release.
   static absl::StatusOr<std::unique_ptr<Farm>> open(const std::filesystem::path& folder,
                                                     const CoordinatorOptions& options = {},
                                                     Durability durability = Durability::kPowerLoss,
-                                                    const FarmLimits& limits = {});
+                                                    const FarmLimits& limits = {}, const std::string& database = "");
 
   Coordinator& coordinator() { return *coordinator_; }
   BlobStore& blobs() { return *blobs_; }

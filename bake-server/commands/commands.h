@@ -11,7 +11,7 @@
 namespace lightloom {
 
 struct ServeOptions {
-  std::string listen = "127.0.0.1:7000", state;
+  std::string listen = "127.0.0.1:7000", state, database;
   bool insecure = false;
   FarmLimits limits;
 };
@@ -19,9 +19,11 @@ struct ServeOptions {
 absl::Status serve(const ServeOptions& options);
 
 /// Prints what it freed.
-absl::Status gc(const std::string& state, int64_t grace_seconds, bool dry_run, const CancelFlag& cancel);
+absl::Status gc(const std::string& state, const std::string& database, int64_t grace_seconds, bool dry_run,
+                const CancelFlag& cancel);
 
 /// Prints what it copied. DataLoss: it is there, but blobs are missing.
-absl::Status backup(const std::string& state, const std::string& to, const CancelFlag& cancel);
+absl::Status backup(const std::string& state, const std::string& database, const std::string& to,
+                    const CancelFlag& cancel);
 
 }  // namespace lightloom

@@ -14,7 +14,8 @@ namespace lightloom {
 
 absl::Status serve(const ServeOptions& options) {
   StopSignal stop;
-  LL_ASSIGN_OR_RETURN(const auto farm, Farm::open(options.state, {}, Durability::kPowerLoss, options.limits));
+  LL_ASSIGN_OR_RETURN(const auto farm,
+                      Farm::open(options.state, {}, Durability::kPowerLoss, options.limits, options.database));
   const ServerInfo info{.version = std::string(kVersion),
                         .protocol_version = kProtocolVersion,
                         .method_version = std::string(kMethodVersion),

@@ -17,15 +17,6 @@ absl::Status stopping() { return absl::UnavailableError("the server is stopping;
 
 }  // namespace
 
-Coordinator::Clock steady_unix_clock() {
-  using std::chrono::milliseconds;
-  const auto began = std::chrono::steady_clock::now();
-  const int64_t unix =
-      std::chrono::duration_cast<milliseconds>(std::chrono::system_clock::now().time_since_epoch()).count();
-  return
-      [=] { return unix + std::chrono::duration_cast<milliseconds>(std::chrono::steady_clock::now() - began).count(); };
-}
-
 Coordinator::Coordinator(Store* store, BlobStore* blobs, Clock clock, CoordinatorOptions options)
     : store_(store),
       clock_(std::move(clock)),

@@ -92,7 +92,4 @@ class Coordinator {
   std::thread thread_;
 };
 
-/// The process's clock: Unix time when it was made, and steady from then on.
-Coordinator::Clock steady_unix_clock();
-
 }  // namespace lightloom

@@ -4,93 +4,77 @@
 #include <sqlite3.h>
 
 #include <cerrno>
-#include <map>
 #include <utility>
 
 #include "core/base/check.h"
+#include "core/base/steady_clock.h"
 
 namespace lightloom {
 
-struct PreparedStatement {
-  sqlite3_stmt* handle = nullptr;
-  bool running = false;
+/// A statement that runs; its error, if any, is what step() returns.
+class SqliteDatabase::Running final : public Rows {
+ public:
+  Running(SqliteDatabase* database, Prepared* statement, absl::Status status)
+      : database_(database), statement_(statement), status_(std::move(status)) {}
+  ~Running() override {
+    if (statement_ == nullptr) return;
+    sqlite3_reset(statement_->handle);
+    sqlite3_clear_bindings(statement_->handle);
+    statement_->running = false;
+  }
+
+  absl::StatusOr<bool> step() override {
+    LL_RETURN_IF_ERROR(status_);
+    const int code = sqlite3_step(statement_->handle);
+    if (code == SQLITE_ROW) return true;
+    if (code == SQLITE_DONE) return false;
+    return database_->error(code);
+  }
+  int64_t integer(int column) const override { return sqlite3_column_int64(statement_->handle, column); }
+  std::string bytes(int column) const override {
+    const void* data = sqlite3_column_blob(statement_->handle, column);
+    const int size = sqlite3_column_bytes(statement_->handle, column);
+    return data == nullptr ? std::string() : std::string(static_cast<const char*>(data), static_cast<size_t>(size));
+  }
+  int64_t changed() const override { return sqlite3_changes64(database_->connection_); }
+
+ private:
+  SqliteDatabase* const database_;
+  Prepared* const statement_;
+  const absl::Status status_;
 };
 
-struct Database::Impl {
-  std::filesystem::path file;
-  sqlite3* connection = nullptr;
-  bool transaction = false;                                  // one has begun, whether or not SQLite still has it
-  absl::Status undone;                                       // the error by which SQLite ended it
-  std::map<std::string_view, PreparedStatement> statements;  // by their SQL; std::map keeps addresses
-};
+namespace {
 
-Query::Query(Query&& other) noexcept
-    : database_(other.database_),
-      statement_(std::exchange(other.statement_, nullptr)),
-      status_(std::move(other.status_)) {}
-
-Query::~Query() {
-  if (statement_ == nullptr) return;
-  // Its error, if any, was returned by step().
-  sqlite3_reset(statement_->handle);
-  sqlite3_clear_bindings(statement_->handle);
-  statement_->running = false;
+int bind(sqlite3_stmt* statement, int index, const Value& value) {
+  if (const auto* number = std::get_if<int64_t>(&value.get())) return sqlite3_bind_int64(statement, index, *number);
+  // A null pointer would bind NULL, not an empty value.
+  const auto data = [](std::string_view bytes) { return bytes.empty() ? "" : bytes.data(); };
+  if (const auto* text = std::get_if<std::string_view>(&value.get())) {
+    return sqlite3_bind_text64(statement, index, data(*text), text->size(), SQLITE_TRANSIENT, SQLITE_UTF8);
+  }
+  const std::string_view bytes = std::get<Blob>(value.get()).bytes;
+  return sqlite3_bind_blob64(statement, index, data(bytes), bytes.size(), SQLITE_TRANSIENT);
 }
 
-void Query::check(int code) {
-  if (code != SQLITE_OK && status_.ok()) status_ = database_->error(code);
+}  // namespace
+
+SqliteDatabase::SqliteDatabase(std::filesystem::path file) : file_(std::move(file)), clock_(steady_unix_clock()) {}
+
+SqliteDatabase::~SqliteDatabase() {
+  for (const auto& [sql, statement] : statements_) sqlite3_finalize(statement.handle);
+  LL_CHECK(sqlite3_close(connection_) == SQLITE_OK);
 }
 
-void Query::bind(int index, int64_t value) {
-  if (statement_ != nullptr) check(sqlite3_bind_int64(statement_->handle, index, value));
-}
-
-// A null pointer would bind NULL, not an empty value.
-void Query::bind(int index, std::string_view text) {
-  if (statement_ == nullptr) return;
-  const char* data = text.empty() ? "" : text.data();
-  check(sqlite3_bind_text64(statement_->handle, index, data, text.size(), SQLITE_TRANSIENT, SQLITE_UTF8));
-}
-
-void Query::bind(int index, Blob blob) {
-  if (statement_ == nullptr) return;
-  const char* data = blob.bytes.empty() ? "" : blob.bytes.data();
-  check(sqlite3_bind_blob64(statement_->handle, index, data, blob.bytes.size(), SQLITE_TRANSIENT));
-}
-
-absl::StatusOr<bool> Query::step() {
-  LL_RETURN_IF_ERROR(status_);
-  const int code = sqlite3_step(statement_->handle);
-  if (code == SQLITE_ROW) return true;
-  if (code == SQLITE_DONE) return false;
-  return database_->error(code);
-}
-
-int64_t Query::integer(int column) const { return sqlite3_column_int64(statement_->handle, column); }
-
-std::string Query::bytes(int column) const {
-  const void* data = sqlite3_column_blob(statement_->handle, column);
-  const int size = sqlite3_column_bytes(statement_->handle, column);
-  return data == nullptr ? std::string() : std::string(static_cast<const char*>(data), static_cast<size_t>(size));
-}
-
-Database::Database(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
-
-Database::~Database() {
-  for (const auto& [sql, statement] : impl_->statements) sqlite3_finalize(statement.handle);
-  LL_CHECK(sqlite3_close(impl_->connection) == SQLITE_OK);
-}
-
-absl::StatusOr<std::unique_ptr<Database>> Database::open(const std::filesystem::path& file, Durability durability) {
-  auto impl = std::make_unique<Impl>();
-  impl->file = file;
+absl::StatusOr<std::unique_ptr<SqliteDatabase>> SqliteDatabase::open(const std::filesystem::path& file,
+                                                                     Durability durability) {
+  std::unique_ptr<SqliteDatabase> database(new SqliteDatabase(file));
   // NOMUTEX: the owner serialises the calls.
   const int flags = SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX | SQLITE_OPEN_EXRESCODE;
-  const int code = sqlite3_open_v2(file.c_str(), &impl->connection, flags, nullptr);
-  std::unique_ptr<Database> database(new Database(std::move(impl)));
+  const int code = sqlite3_open_v2(file.c_str(), &database->connection_, flags, nullptr);
   if (code != SQLITE_OK) return database->error(code);
   // Nobody else writes here (the folder is locked), but a backup or a curious person may read.
-  sqlite3_busy_timeout(database->impl_->connection, 5000);
+  sqlite3_busy_timeout(database->connection_, 5000);
   {
     Query mode = database->query("PRAGMA journal_mode=WAL");
     LL_RETURN_IF_ERROR(mode.step().status());
@@ -106,53 +90,66 @@ absl::StatusOr<std::unique_ptr<Database>> Database::open(const std::filesystem::
   return database;
 }
 
-absl::Status Database::script(const char* sql) {
-  const int code = sqlite3_exec(impl_->connection, sql, nullptr, nullptr, nullptr);
+absl::Status SqliteDatabase::script(const char* sql) {
+  const int code = sqlite3_exec(connection_, sql, nullptr, nullptr, nullptr);
   return code == SQLITE_OK ? absl::OkStatus() : error(code);
 }
 
-int64_t Database::last_insert_id() const { return sqlite3_last_insert_rowid(impl_->connection); }
+absl::StatusOr<int64_t> SqliteDatabase::number(const char* sql) {
+  Query rows = query(sql);
+  LL_RETURN_IF_ERROR(rows.step().status());
+  return rows.integer(0);
+}
 
-const std::filesystem::path& Database::file() const { return impl_->file; }
+absl::StatusOr<int64_t> SqliteDatabase::schema_version() { return number("PRAGMA user_version"); }
 
-Query Database::prepare(const char* sql) {
-  Query query(this);
-  PreparedStatement& statement = impl_->statements[sql];
+absl::StatusOr<bool> SqliteDatabase::is_empty() {
+  LL_ASSIGN_OR_RETURN(const int64_t things, number("SELECT COUNT(*) FROM sqlite_master"));
+  return things == 0;
+}
+
+std::unique_ptr<Rows> SqliteDatabase::start(const char* sql, std::span<const Value> values) {
+  Prepared& statement = statements_[sql];
+  int code = SQLITE_OK;
   if (statement.handle == nullptr) {
-    query.check(sqlite3_prepare_v3(impl_->connection, sql, -1, SQLITE_PREPARE_PERSISTENT, &statement.handle, nullptr));
-    if (!query.status_.ok()) return query;
+    code = sqlite3_prepare_v3(connection_, sql, -1, SQLITE_PREPARE_PERSISTENT, &statement.handle, nullptr);
+    if (code != SQLITE_OK) return std::make_unique<Running>(this, nullptr, error(code));
   }
   LL_CHECK(!statement.running);
   statement.running = true;
-  query.statement_ = &statement;
-  return query;
+  absl::Status status = absl::OkStatus();
+  for (size_t i = 0; i < values.size() && code == SQLITE_OK; ++i) {
+    code = bind(statement.handle, static_cast<int>(i) + 1, values[i]);
+    if (code != SQLITE_OK) status = error(code);
+  }
+  return std::make_unique<Running>(this, &statement, std::move(status));
 }
 
-absl::StatusOr<int64_t> Database::finish(Query& statement) {
+/// At once: there is nobody to wait for.
+absl::Status SqliteDatabase::send_statement(const char* sql, std::span<const Value> values) {
+  const std::unique_ptr<Rows> rows = start(sql, values);
   for (bool row = true; row;) {
-    LL_ASSIGN_OR_RETURN(row, statement.step());
+    LL_ASSIGN_OR_RETURN(row, rows->step());
   }
-  return sqlite3_changes64(impl_->connection);
+  return absl::OkStatus();
 }
 
-absl::Status Database::error(int code) const {
+absl::Status SqliteDatabase::error(int code) {
   absl::Status status = in_words(code);
-  if (impl_->transaction && impl_->undone.ok() && sqlite3_get_autocommit(impl_->connection) != 0) {
-    impl_->undone = status;
-  }
+  if (transaction_ && undone_.ok() && sqlite3_get_autocommit(connection_) != 0) undone_ = status;
   return status;
 }
 
-absl::Status Database::in_words(int code) const {
-  const std::string file = impl_->file.string();
-  const std::string folder = impl_->file.parent_path().string();
-  const std::string reason = impl_->connection == nullptr ? sqlite3_errstr(code) : sqlite3_errmsg(impl_->connection);
-  const int system_error = impl_->connection == nullptr ? 0 : sqlite3_system_errno(impl_->connection);
+absl::Status SqliteDatabase::in_words(int code) const {
+  const std::string file = file_.string();
+  const std::string folder = file_.parent_path().string();
+  const std::string reason = connection_ == nullptr ? sqlite3_errstr(code) : sqlite3_errmsg(connection_);
+  const int system_error = connection_ == nullptr ? 0 : sqlite3_system_errno(connection_);
   const int kind = code & 0xFF;  // extended codes hold the plain one in their low byte
 
   const bool no_space = system_error == ENOSPC || system_error == EDQUOT || system_error == EFBIG;
   // SQLite does not say why it could not make a file: it then tried to read it, and says why that failed.
-  const bool no_file = kind == SQLITE_CANTOPEN && absl::IsResourceExhausted(check_writable(impl_->file));
+  const bool no_file = kind == SQLITE_CANTOPEN && absl::IsResourceExhausted(check_writable(file_));
   if (kind == SQLITE_FULL || (kind == SQLITE_IOERR && no_space) || no_file) {
     return absl::ResourceExhaustedError(
         absl::StrCat("no space left for the farm's state in ", folder, " (", reason, "): free some on that disk"));
@@ -185,41 +182,32 @@ absl::Status Database::in_words(int code) const {
   return absl::InternalError(absl::StrCat(file, ": SQLite error ", code, " (", reason, "): please report this"));
 }
 
-absl::Status Transaction::begin() {
-  Database::Impl& impl = *database_.impl_;
-  const bool inner = impl.transaction;
+absl::Status SqliteDatabase::begin(bool inner) {
   // Some errors end a transaction: what comes after them must not be committed by itself.
-  if (inner && sqlite3_get_autocommit(impl.connection) != 0) return undone();
+  if (inner && sqlite3_get_autocommit(connection_) != 0) return undone();
   // IMMEDIATE: what the transaction reads must not change before it writes.
-  LL_RETURN_IF_ERROR(database_.run(inner ? "SAVEPOINT inner" : "BEGIN IMMEDIATE").status());
-  state_ = inner ? State::kInner : State::kOuter;
-  impl.transaction = true;
-  if (!inner) impl.undone = absl::OkStatus();
+  LL_RETURN_IF_ERROR(run(inner ? "SAVEPOINT inner_one" : "BEGIN IMMEDIATE").status());
+  transaction_ = true;
+  if (!inner) undone_ = absl::OkStatus();
   return absl::OkStatus();
 }
 
-absl::Status Transaction::undone() const {
-  const Database::Impl& impl = *database_.impl_;
-  if (!impl.undone.ok()) return impl.undone;
-  return absl::AbortedError(impl.file.string() + ": an earlier error has undone this change; try again");
+absl::Status SqliteDatabase::undone() const {
+  if (!undone_.ok()) return undone_;
+  return absl::AbortedError(file_.string() + ": an earlier error has undone this change; try again");
 }
 
-absl::Status Transaction::commit() {
-  Database::Impl& impl = *database_.impl_;
-  if (sqlite3_get_autocommit(impl.connection) != 0) return undone();
-  LL_RETURN_IF_ERROR(database_.run(state_ == State::kInner ? "RELEASE inner" : "COMMIT").status());
-  if (state_ == State::kOuter) impl.transaction = false;
-  state_ = State::kClosed;
+absl::Status SqliteDatabase::commit(bool inner) {
+  if (sqlite3_get_autocommit(connection_) != 0) return undone();
+  LL_RETURN_IF_ERROR(run(inner ? "RELEASE inner_one" : "COMMIT").status());
+  if (!inner) transaction_ = false;
   return absl::OkStatus();
 }
 
-Transaction::~Transaction() {
-  if (state_ == State::kClosed) return;
-  Database::Impl& impl = *database_.impl_;
-  if (state_ == State::kOuter) impl.transaction = false;
-  if (sqlite3_get_autocommit(impl.connection) != 0) return;
-  sqlite3_exec(impl.connection, state_ == State::kInner ? "ROLLBACK TO inner; RELEASE inner" : "ROLLBACK", nullptr,
-               nullptr, nullptr);
+void SqliteDatabase::roll_back(bool inner) {
+  if (!inner) transaction_ = false;
+  if (sqlite3_get_autocommit(connection_) != 0) return;
+  sqlite3_exec(connection_, inner ? "ROLLBACK TO inner_one; RELEASE inner_one" : "ROLLBACK", nullptr, nullptr, nullptr);
 }
 
 }  // namespace lightloom

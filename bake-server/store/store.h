@@ -167,7 +167,7 @@ using AdmitJob = std::function<absl::Status(const NewJob&)>;
 /// Returns false to be called no more.
 using VisitDigest = std::function<bool(const Digest&)>;
 
-/// Thread-safe. Reads no clock and makes no random numbers: times are the caller's, in milliseconds, and so are tokens.
+/// Thread-safe. Calls read no clock and make no random numbers: times are the caller's, in milliseconds, and so are tokens.
 /// A call either returns after its change is durable, or changes nothing and returns an error: ResourceExhausted if the
 /// disk is full (worth another try once it is not), DataLoss if the stored state is damaged, Unavailable or
 /// PermissionDenied if it cannot be reached.
@@ -177,6 +177,10 @@ class Store {
   virtual ~Store() = default;
   Store(const Store&) = delete;
   Store& operator=(const Store&) = delete;
+
+  /// The clock that times here are by, where nothing else is said: of all who share the store the same, in milliseconds of Unix
+  /// time that never run backwards. Waits for nobody.
+  virtual int64_t now_ms() = 0;
 
   /// Makes what `calls` does with this store durable together, once: all of it, or, if it or the end fails, nothing.
   /// Other threads wait meanwhile.

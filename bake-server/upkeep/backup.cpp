@@ -7,11 +7,16 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <functional>
+#include <memory>
 #include <system_error>
 #include <vector>
 
 #include "bake-server/blobs/blob_store.h"
-#include "bake-server/store/sqlite_upkeep.h"
+#include "bake-server/store/copy_tables.h"
+#include "bake-server/store/postgres_store.h"
+#include "bake-server/store/sql_upkeep.h"
+#include "bake-server/store/sqlite_store.h"
 #include "bake-server/upkeep/upkeep_lock.h"
 #include "core/base/file.h"
 #include "core/base/parse_size.h"
@@ -96,11 +101,27 @@ absl::Status add_blob(const Digest& digest, const fs::path& state, const BlobSto
   return absl::OkStatus();
 }
 
+/// Into a SQLite file, whatever `database` is.
+using CopyDatabase = std::function<absl::Status(const fs::path& to)>;
+
+absl::StatusOr<CopyDatabase> copier(const fs::path& state, const std::string& database) {
+  if (database.empty()) {
+    LL_ASSIGN_OR_RETURN(std::shared_ptr<Database> original, open_sqlite_reader(state));
+    return [original](const fs::path& to) { return copy_sqlite(*original, to); };
+  }
+  LL_RETURN_IF_ERROR(open_postgres_reader(database).status());
+  return [database](const fs::path& to) -> absl::Status {
+    LL_ASSIGN_OR_RETURN(const auto copy, make_sqlite(to));
+    return copy_postgres(database, *copy);
+  };
+}
+
 }  // namespace
 
-absl::StatusOr<Backup> back_up(const fs::path& state, const fs::path& target, const CancelFlag* cancel) {
+absl::StatusOr<Backup> back_up(const fs::path& state, const fs::path& target, const CancelFlag* cancel,
+                               const std::string& database) {
   const fs::path to = (target / "").parent_path();  // without a slash at the end
-  LL_ASSIGN_OR_RETURN(const auto original, open_sqlite_reader(state));
+  LL_ASSIGN_OR_RETURN(const CopyDatabase copy_database, copier(state, database));
   LL_RETURN_IF_ERROR(check_target(state, to));
   LL_ASSIGN_OR_RETURN(const UpkeepLock lock, UpkeepLock::wait(state));
 
@@ -109,7 +130,7 @@ absl::StatusOr<Backup> back_up(const fs::path& state, const fs::path& target, co
   std::error_code error;
   fs::create_directories(draft.path(), error);
   if (error) return failed("make", draft.path(), error.message());
-  LL_RETURN_IF_ERROR(copy_database(*original, draft.path() / "store.db"));
+  LL_RETURN_IF_ERROR(copy_database(draft.path() / "store.db"));
 
   std::vector<Digest> digests;
   {
@@ -139,6 +160,12 @@ absl::StatusOr<Backup> back_up(const fs::path& state, const fs::path& target, co
   if (::rename(draft.path().c_str(), to.c_str()) != 0) return failed("write", to, std::strerror(errno));
   LL_RETURN_IF_ERROR(sync_file_system(to));
   return backup;
+}
+
+absl::Status restore(const fs::path& from, const std::string& database) {
+  LL_ASSIGN_OR_RETURN(const auto backup, open_sqlite_reader(from));
+  LL_ASSIGN_OR_RETURN(const auto into, make_postgres(database));
+  return copy_tables(*backup, *into);
 }
 
 std::string backup_text(const Backup& backup) {

@@ -78,7 +78,7 @@ class FarmTest : public testing::Test {
   void start_server(const std::string& address) {
     CoordinatorOptions options;
     options.dispatch.lease_ms = 5'000;
-    farm_ = value_or_die(Farm::open(folder_.path() / "state", options));
+    farm_ = value_or_die(Farm::open(folder_.path() / "state", options, Durability::kPowerLoss, {}, database_));
     server_ = value_or_die(Server::start(address, this_release(), farm_.get()));
   }
   /// As if the power went: nothing is said to anyone but by closed connections.
@@ -126,6 +126,7 @@ class FarmTest : public testing::Test {
   std::filesystem::path scene_path_;
   std::vector<uint8_t> scene_;
   BakeParams params_;
+  std::string database_;  // PostgreSQL's address; empty: SQLite
   std::map<std::string, std::vector<uint8_t>> baked_;
   std::unique_ptr<Farm> farm_;
   std::unique_ptr<Server> server_;  // before the farm it works on

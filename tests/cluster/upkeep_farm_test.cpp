@@ -7,8 +7,11 @@
 #include <atomic>
 #include <thread>
 
-#include "bake-server/store/sqlite_upkeep.h"
+#include "bake-server/store/sql_upkeep.h"
+#include "bake-server/store/sqlite_database.h"
+#include "bake-server/store/sqlite_store.h"
 #include "bake-server/upkeep/backup.h"
+#include "core/base/steady_clock.h"
 #include "tests/cluster/farm_fixture.h"
 
 namespace lightloom {
@@ -168,7 +171,7 @@ TEST_F(UpkeepFarm, WhatAForgottenJobLeftIsFreed) {
   limits.upkeep.emplace();
   restart(limits);
   const int64_t later = steady_unix_clock()() + 31 * int64_t{86'400'000};
-  const auto reader = value_or_die(Database::open(state() / "store.db", Durability::kProcess));
+  const auto reader = value_or_die(SqliteDatabase::open(state() / "store.db", Durability::kProcess));
   EXPECT_EQ(value_or_die(forget_ended(*reader, later, 1'000'000)).jobs, 1u);
   EXPECT_GT(gc(3600).blobs, 5u);
   EXPECT_EQ(gc(3600).kept, 0u);

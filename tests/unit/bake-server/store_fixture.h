@@ -1,10 +1,11 @@
-// What the tests of Store share: its implementations, and small jobs.
+// What the tests of Store share: small jobs.
 #pragma once
 
 #include <absl/strings/str_cat.h>
 #include <gtest/gtest.h>
 #include <stdlib.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -36,17 +37,6 @@ class TemporaryFolder {
  private:
   std::filesystem::path path_;
 };
-
-/// An implementation; opening the same folder again finds what was there.
-struct StoreBackend {
-  std::string name;
-  std::function<absl::StatusOr<std::unique_ptr<Store>>(const std::filesystem::path&)> open;
-};
-inline std::ostream& operator<<(std::ostream& out, const StoreBackend& backend) { return out << backend.name; }
-
-inline std::vector<StoreBackend> store_backends() {
-  return {{"Sqlite", [](const std::filesystem::path& folder) { return open_sqlite_store(folder); }}};
-}
 
 /// The value; an error fails the test and gives an empty one.
 template <class T>

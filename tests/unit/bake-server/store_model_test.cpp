@@ -10,6 +10,7 @@
 #include <set>
 
 #include "bake-server/store/store.h"
+#include "tests/unit/bake-server/store_backends.h"
 #include "tests/unit/bake-server/store_fixture.h"
 
 namespace lightloom::test {

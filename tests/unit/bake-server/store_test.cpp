@@ -9,6 +9,7 @@
 #include <thread>
 #include <utility>
 
+#include "tests/unit/bake-server/store_backends.h"
 #include "tests/unit/bake-server/store_fixture.h"
 
 namespace lightloom::test {

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "bake-server/store/store.h"
+#include "tests/unit/bake-server/store_backends.h"
 #include "tests/unit/bake-server/store_fixture.h"
 
 namespace lightloom::test {

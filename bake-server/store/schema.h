@@ -1,9 +1,9 @@
-// The tables of sqlite_store.cpp.
+// The tables of a store.
 #pragma once
 
-#include <filesystem>
+#include <cstdint>
 
-#include "bake-server/store/sqlite_database.h"
+#include "bake-server/store/database.h"
 #include "core/base/status.h"
 
 namespace lightloom {
@@ -21,9 +21,14 @@ enum class AttemptState {
   kMismatched = 7,  // it raised the alarm; once is enough
 };
 
+template <class Enum>
+int64_t number(Enum value) {
+  return static_cast<int64_t>(value);
+}
+
 /// Makes the tables in an empty database. FailedPrecondition for a newer schema or somebody else's database.
-absl::Status prepare_sqlite_schema(Database& database, const std::filesystem::path& file);
+absl::Status prepare_schema(Database& database);
 /// For who only reads: FailedPrecondition unless the tables are those of this release.
-absl::Status check_sqlite_schema(Database& database, const std::filesystem::path& file);
+absl::Status check_schema(Database& database);
 
 }  // namespace lightloom

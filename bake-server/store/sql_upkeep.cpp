@@ -1,17 +1,11 @@
-#include "bake-server/store/sqlite_upkeep.h"
-
-#include <absl/strings/str_cat.h>
+#include "bake-server/store/sql_upkeep.h"
 
 #include <algorithm>
-#include <system_error>
 
 #include "bake-server/store/packed_digests.h"
-#include "bake-server/store/sqlite_schema.h"
 
 namespace lightloom {
 namespace {
-
-namespace fs = std::filesystem;
 
 /// Of rows that hold packed digests in column 0.
 absl::Status visit_rows(Query rows, const VisitDigest& visit) {
@@ -33,18 +27,6 @@ absl::StatusOr<JobId> ended_before(Database& database, int64_t before_ms) {
 }
 
 }  // namespace
-
-absl::StatusOr<std::unique_ptr<Database>> open_sqlite_reader(const fs::path& folder) {
-  const fs::path file = folder / "store.db";
-  std::error_code error;
-  if (!fs::is_regular_file(file, error)) {
-    return absl::FailedPreconditionError(absl::StrCat(
-        folder.string(), " is no state folder of lightloom-server (it has no store.db): give one that --state names"));
-  }
-  LL_ASSIGN_OR_RETURN(auto database, Database::open(file, Durability::kProcess));
-  LL_RETURN_IF_ERROR(check_sqlite_schema(*database, file));
-  return database;
-}
 
 absl::StatusOr<Forgotten> forget_ended(Database& database, int64_t before_ms, uint32_t limit) {
   Forgotten out;
@@ -94,11 +76,6 @@ absl::StatusOr<std::vector<Digest>> references_of(Database& database, const std:
   std::sort(digests.begin(), digests.end());
   digests.erase(std::unique(digests.begin(), digests.end()), digests.end());
   return digests;
-}
-
-absl::Status copy_database(Database& database, const fs::path& to) {
-  // A snapshot, without the pages that are free.
-  return database.run("VACUUM INTO ?1", to.string()).status();
 }
 
 }  // namespace lightloom

@@ -1,4 +1,4 @@
-#include "bake-server/store/sqlite_schema.h"
+#include "bake-server/store/schema.h"
 
 #include <absl/strings/str_cat.h>
 
@@ -98,41 +98,35 @@ CREATE INDEX tasks_spawned ON tasks (spawner) WHERE spawner != 0;
 PRAGMA user_version = 2;
 )";
 
-absl::StatusOr<int64_t> number_of(Database& database, const char* sql) {
-  Query query = database.query(sql);
-  LL_RETURN_IF_ERROR(query.step().status());
-  return query.integer(0);
-}
-
 }  // namespace
 
-absl::Status prepare_sqlite_schema(Database& database, const std::filesystem::path& file) {
+absl::Status prepare_schema(Database& database) {
   Transaction transaction(database);
   LL_RETURN_IF_ERROR(transaction.begin());
-  LL_ASSIGN_OR_RETURN(const int64_t version, number_of(database, "PRAGMA user_version"));
+  LL_ASSIGN_OR_RETURN(const int64_t version, database.schema_version());
   if (version == kSchemaVersion) return absl::OkStatus();
   if (version == 1) {
     LL_RETURN_IF_ERROR(database.script(kFrom1));
     return transaction.commit();
   }
   if (version != 0) {
-    return absl::FailedPreconditionError(
-        absl::StrCat(file.string(), " has schema version ", version, ", this server knows up to ", kSchemaVersion,
-                     ": run the newer release that wrote it, or give another state folder"));
+    return absl::FailedPreconditionError(absl::StrCat(database.name(), " has schema version ", version,
+                                                      ", this server knows up to ", kSchemaVersion,
+                                                      ": run the newer release that wrote it, or give another one"));
   }
-  LL_ASSIGN_OR_RETURN(const int64_t things, number_of(database, "SELECT COUNT(*) FROM sqlite_master"));
-  if (things != 0) {
+  LL_ASSIGN_OR_RETURN(const bool empty, database.is_empty());
+  if (!empty) {
     return absl::FailedPreconditionError(
-        absl::StrCat(file.string(), " is a database of something else: give another state folder"));
+        absl::StrCat(database.name(), " is a database of something else: give another one"));
   }
   LL_RETURN_IF_ERROR(database.script(kSchema));
   return transaction.commit();
 }
 
-absl::Status check_sqlite_schema(Database& database, const std::filesystem::path& file) {
-  LL_ASSIGN_OR_RETURN(const int64_t version, number_of(database, "PRAGMA user_version"));
+absl::Status check_schema(Database& database) {
+  LL_ASSIGN_OR_RETURN(const int64_t version, database.schema_version());
   if (version == kSchemaVersion) return absl::OkStatus();
-  return absl::FailedPreconditionError(absl::StrCat(file.string(), " has schema version ", version,
+  return absl::FailedPreconditionError(absl::StrCat(database.name(), " has schema version ", version,
                                                     ", this program knows ", kSchemaVersion,
                                                     ": use the release of the server that works on it"));
 }
