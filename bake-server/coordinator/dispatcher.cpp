@@ -121,7 +121,8 @@ absl::Status Dispatcher::resend(const std::vector<std::string>& attempts, Worker
       forget(attempt, worker);
       continue;
     }
-    LL_ASSIGN_OR_RETURN(Assignment again, assignment(held->second.task, attempt));
+    LL_ASSIGN_OR_RETURN(const Job job, store_->job(held->second.job));
+    LL_ASSIGN_OR_RETURN(Assignment again, assignment(held->second.task, attempt, job.priority));
     pending->answer.assignments.push_back(std::move(again));
     if (pending->room > 0) --pending->room;
   }
@@ -168,6 +169,9 @@ absl::Status Dispatcher::give_out(int64_t now_ms) {
     return std::any_of(view.begin(), view.end(), [&](const JobView& job) { return job.id == id; });
   };
   std::erase_if(inputs_, [&](const auto& list) { return !runs(list.first.first); });
+  std::erase_if(payloads_, [&](const auto& payload) { return !runs(payload.first); });
+  std::map<JobId, int32_t> priorities;
+  for (const JobView& job : view) priorities[job.id] = job.priority;
   for (auto& [id, worker] : workers_) std::erase_if(worker.warmed, [&](JobId job) { return !runs(job); });
   std::vector<JobId> waiting;  // jobs of which nothing is left to give out now
   for (const JobView& job : view) {
@@ -180,7 +184,7 @@ absl::Status Dispatcher::give_out(int64_t now_ms) {
   for (const Decision& d : decide(std::move(view), std::move(demands), now_ms, options_.decide, present)) {
     const NewLease lease{d.task, d.worker, options_.new_token(), now_ms + options_.lease_ms, kMaxLive};
     // First, so that nothing is leased that cannot be told.
-    LL_ASSIGN_OR_RETURN(Assignment assigned, assignment(d.task, lease.token));
+    LL_ASSIGN_OR_RETURN(Assignment assigned, assignment(d.task, lease.token, priorities.at(d.job)));
     LL_ASSIGN_OR_RETURN(const bool leased, store_->lease(lease, now_ms));
     if (!leased) continue;  // somebody else was faster: look again with the next step
     Worker& worker = workers_[d.worker];
@@ -215,11 +219,15 @@ absl::Status Dispatcher::warm_up(const std::vector<JobId>& jobs) {
   return absl::OkStatus();
 }
 
-absl::StatusOr<Assignment> Dispatcher::assignment(TaskId id, const std::string& attempt) {
+absl::StatusOr<Assignment> Dispatcher::assignment(TaskId id, const std::string& attempt, int32_t priority) {
   LL_ASSIGN_OR_RETURN(const Task task, store_->task(id));
-  LL_ASSIGN_OR_RETURN(const Job job, store_->job(task.job));
   LL_ASSIGN_OR_RETURN(const std::optional<Digest> inputs, inputs_of(task));
-  return Assignment{attempt, task.job, job.priority, job.payload, task.kind, task.argument, inputs};
+  auto payload = payloads_.find(task.job);
+  if (payload == payloads_.end()) {
+    LL_ASSIGN_OR_RETURN(Job job, store_->job(task.job));
+    payload = payloads_.emplace(task.job, std::move(job.payload)).first;
+  }
+  return Assignment{attempt, task.job, priority, payload->second, task.kind, task.argument, inputs};
 }
 
 /// A blob that lists what all stages below gave. They are done, so it does not change any more.

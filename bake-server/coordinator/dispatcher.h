@@ -135,7 +135,7 @@ class Dispatcher {
   absl::Status resend(const std::vector<std::string>& attempts, Worker* worker, Pending* pending, int64_t now_ms);
   absl::Status give_out(int64_t now_ms);
   absl::Status warm_up(const std::vector<JobId>& jobs);
-  absl::StatusOr<Assignment> assignment(TaskId task, const std::string& attempt);
+  absl::StatusOr<Assignment> assignment(TaskId task, const std::string& attempt, int32_t priority);
   absl::StatusOr<std::optional<Digest>> inputs_of(const Task& task);
   std::vector<Answered> take_due(int64_t now_ms);
   void answer(Pending* pending, const absl::Status& status);
@@ -148,6 +148,7 @@ class Dispatcher {
   std::vector<Pending> pending_;
   std::vector<Answered> answered_;                       // out with the next step
   std::map<std::pair<JobId, uint32_t>, Digest> inputs_;  // of stages of running jobs
+  std::map<JobId, std::string> payloads_;                // of running jobs: they do not change
   RayMeter rays_;
 };
 

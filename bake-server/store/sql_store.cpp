@@ -109,23 +109,22 @@ class SqlStore final : public Store {
     const std::lock_guard guard(mutex_);
     Transaction transaction(*db_);
     LL_RETURN_IF_ERROR(transaction.begin());
-    LL_ASSIGN_OR_RETURN(const Attempt used, find_attempt(lease.token));
-    if (used.id != 0) {
-      return absl::AlreadyExistsError(absl::StrCat("the token '", printable(lease.token),
-                                                   "' already names an attempt at ", "task ", used.task,
-                                                   ": make a new one per lease"));
-    }
     LL_ASSIGN_OR_RETURN(
         const int64_t leased,
         db_->run("INSERT INTO attempts (task, token, worker, leased_ms, expires_ms)"
                  " SELECT t.id, ?2, ?3, ?4, ?5 FROM tasks t JOIN progress p ON p.job = t.job"
                  " WHERE t.id = ?1 AND t.state = 0 AND t.stage = p.open_stage AND p.state = 0 AND t.live < ?6"
-                 " AND NOT EXISTS (SELECT 1 FROM attempts a WHERE a.task = t.id AND a.state = 0 AND a.worker = ?3)",
+                 " AND NOT EXISTS (SELECT 1 FROM attempts a WHERE a.task = t.id AND a.state = 0 AND a.worker = ?3)"
+                 " AND NOT EXISTS (SELECT 1 FROM attempts a WHERE a.token = ?2)",
                  lease.task, lease.token, lease.worker, now_ms, lease.expires_ms, lease.max_live));
-    if (leased == 0) return false;
-
-    LL_RETURN_IF_ERROR(db_->send("UPDATE tasks SET live = live + 1 WHERE id = ?1", lease.task));
-    LL_ASSIGN_OR_RETURN(const TaskRow task, find_task(lease.task));
+    if (leased == 0) {
+      LL_ASSIGN_OR_RETURN(const Found used, find_attempt(lease.token));
+      if (used.attempt.id == 0) return false;
+      return absl::AlreadyExistsError(absl::StrCat("the token '", printable(lease.token),
+                                                   "' already names an attempt at task ", used.attempt.task,
+                                                   ": make a new one per lease"));
+    }
+    LL_ASSIGN_OR_RETURN(const TaskRow task, change_live(lease.task, 1));
     LL_RETURN_IF_ERROR(progress_.count(task.job, task.live == 1 ? Counts{.ready = -1, .running = 1} : Counts{}));
     LL_RETURN_IF_ERROR(progress_.record(task.job, now_ms, lease.task, lease.worker, "leased"));
     LL_RETURN_IF_ERROR(transaction.commit());
@@ -155,10 +154,11 @@ class SqlStore final : public Store {
     Transaction transaction(*db_);
     LL_RETURN_IF_ERROR(transaction.begin());
     for (const std::string& token : tokens) {
-      LL_ASSIGN_OR_RETURN(const Attempt attempt, find_attempt(token));
+      LL_ASSIGN_OR_RETURN(const Found found, find_attempt(token));
+      const Attempt& attempt = found.attempt;
       if (attempt.state != AttemptState::kLive || attempt.worker != worker) continue;
-      LL_ASSIGN_OR_RETURN(const JobId job, give_up(attempt, AttemptState::kReleased));
-      LL_RETURN_IF_ERROR(progress_.record(job, now_ms, attempt.task, worker, "released"));
+      LL_ASSIGN_OR_RETURN(const TaskRow task, give_up(attempt, AttemptState::kReleased));
+      LL_RETURN_IF_ERROR(progress_.record(task.job, now_ms, attempt.task, worker, "released"));
     }
     return transaction.commit();
   }
@@ -181,9 +181,9 @@ class SqlStore final : public Store {
     }
     if (tokens.empty()) return tokens;
     for (const std::string& token : tokens) {
-      LL_ASSIGN_OR_RETURN(const Attempt attempt, find_attempt(token));
-      LL_ASSIGN_OR_RETURN(const JobId job, give_up(attempt, AttemptState::kExpired));
-      LL_RETURN_IF_ERROR(progress_.record(job, now_ms, attempt.task, attempt.worker, "expired"));
+      LL_ASSIGN_OR_RETURN(const Found found, find_attempt(token));
+      LL_ASSIGN_OR_RETURN(const TaskRow task, give_up(found.attempt, AttemptState::kExpired));
+      LL_RETURN_IF_ERROR(progress_.record(task.job, now_ms, task.id, found.attempt.worker, "expired"));
     }
     LL_RETURN_IF_ERROR(transaction.commit());
     return tokens;
@@ -203,9 +203,9 @@ class SqlStore final : public Store {
     const std::lock_guard guard(mutex_);
     Transaction transaction(*db_);
     LL_RETURN_IF_ERROR(transaction.begin());
-    LL_ASSIGN_OR_RETURN(const Attempt attempt, find_attempt(token));
+    LL_ASSIGN_OR_RETURN(const Found found, find_attempt(token));
+    const auto& [attempt, task, job_state] = found;
     if (attempt.id == 0) return Completion::kUnknown;
-    LL_ASSIGN_OR_RETURN(const TaskRow task, find_task(attempt.task));
     if (task.state == StoredTask::kDone) {
       if (task.outputs == packed) return Completion::kAlreadyDone;
       if (attempt.state != AttemptState::kMismatched) {
@@ -216,7 +216,6 @@ class SqlStore final : public Store {
       }
       return Completion::kMismatch;
     }
-    LL_ASSIGN_OR_RETURN(const JobState job_state, state_of(*db_, task.job));
     if (job_state != JobState::kRunning) return Completion::kJobEnded;
     LL_RETURN_IF_ERROR(check_spawned(task, spawned));
 
@@ -229,9 +228,11 @@ class SqlStore final : public Store {
     Counts change{.done = 1};
     (task.state == StoredTask::kFailed ? change.failed : task.live > 0 ? change.running : change.ready) = -1;
     LL_RETURN_IF_ERROR(progress_.count(task.job, change));
-    LL_ASSIGN_OR_RETURN(const std::string work, work_of_job(task.job));
-    LL_RETURN_IF_ERROR(progress_.insert_tasks(task.job, work, spawned, task.id));
-    LL_RETURN_IF_ERROR(progress_.add_tasks(task.job, static_cast<int64_t>(spawned.size())));
+    if (!spawned.empty()) {
+      LL_ASSIGN_OR_RETURN(const std::string work, work_of_job(task.job));
+      LL_RETURN_IF_ERROR(progress_.insert_tasks(task.job, work, spawned, task.id));
+      LL_RETURN_IF_ERROR(progress_.add_tasks(task.job, static_cast<int64_t>(spawned.size())));
+    }
     LL_RETURN_IF_ERROR(progress_.record(task.job, now_ms, task.id, attempt.worker, "completed"));
     LL_RETURN_IF_ERROR(progress_.advance(task.job, now_ms));
     LL_RETURN_IF_ERROR(transaction.commit());
@@ -244,15 +245,16 @@ class SqlStore final : public Store {
     const std::lock_guard guard(mutex_);
     Transaction transaction(*db_);
     LL_RETURN_IF_ERROR(transaction.begin());
-    LL_ASSIGN_OR_RETURN(const Attempt attempt, find_attempt(token));
+    LL_ASSIGN_OR_RETURN(const Found found, find_attempt(token));
+    const Attempt& attempt = found.attempt;
     if (attempt.id == 0 || attempt.state != AttemptState::kLive) return false;
-    LL_ASSIGN_OR_RETURN(const JobId job, give_up(attempt, AttemptState::kFailed));
+    LL_ASSIGN_OR_RETURN(const TaskRow task, give_up(attempt, AttemptState::kFailed));
+    const JobId job = task.job;
     LL_RETURN_IF_ERROR(
         db_->send("UPDATE tasks SET failures = failures + 1, error = ?2 WHERE id = ?1", attempt.task, kept));
     LL_RETURN_IF_ERROR(progress_.record(job, now_ms, attempt.task, attempt.worker, absl::StrCat("failed: ", kept)));
 
-    LL_ASSIGN_OR_RETURN(const TaskRow task, find_task(attempt.task));
-    if (task.failures >= max_failures) {
+    if (task.failures + 1 >= max_failures) {
       LL_RETURN_IF_ERROR(end_attempts(task.id));
       LL_RETURN_IF_ERROR(
           db_->send("UPDATE tasks SET state = ?2, live = 0 WHERE id = ?1", task.id, number(StoredTask::kFailed)));
@@ -329,6 +331,12 @@ class SqlStore final : public Store {
     std::string outputs;
   };
 
+  struct Found {
+    Attempt attempt;
+    TaskRow task;
+    JobState job = JobState::kRunning;
+  };
+
   /// Returns the id of the row.
   template <class... Args>
   absl::StatusOr<int64_t> insert(const char* sql, const Args&... args) {
@@ -339,27 +347,43 @@ class SqlStore final : public Store {
     return id;
   }
 
-  absl::StatusOr<Attempt> find_attempt(const std::string& token) {
-    Query query = db_->query("SELECT id, task, worker, state FROM attempts WHERE token = ?1", token);
+  /// The attempt and all that decides what becomes of it, in one round trip.
+  absl::StatusOr<Found> find_attempt(const std::string& token) {
+    Query query = db_->query(
+        "SELECT a.id, a.task, a.worker, a.state, t.job, t.stage, t.state, t.live, t.failures, t.outputs, p.state"
+        " FROM attempts a JOIN tasks t ON t.id = a.task JOIN progress p ON p.job = t.job WHERE a.token = ?1",
+        token);
     LL_ASSIGN_OR_RETURN(const bool found, query.step());
-    if (!found) return Attempt{};
-    return Attempt{.id = query.integer(0),
-                   .task = query.integer(1),
-                   .worker = query.bytes(2),
-                   .state = static_cast<AttemptState>(query.integer(3))};
+    if (!found) return Found{};
+    return Found{.attempt = {.id = query.integer(0),
+                             .task = query.integer(1),
+                             .worker = query.bytes(2),
+                             .state = static_cast<AttemptState>(query.integer(3))},
+                 .task = {.id = query.integer(1),
+                          .job = query.integer(4),
+                          .stage = query.integer(5),
+                          .state = static_cast<StoredTask>(query.integer(6)),
+                          .live = query.integer(7),
+                          .failures = query.integer(8),
+                          .outputs = query.bytes(9)},
+                 .job = static_cast<JobState>(query.integer(10))};
   }
 
-  absl::StatusOr<TaskRow> find_task(TaskId id) {
-    Query query = db_->query("SELECT job, stage, state, live, failures, outputs FROM tasks WHERE id = ?1", id);
+  /// The task as it is with so many more live attempts.
+  absl::StatusOr<TaskRow> change_live(TaskId id, int64_t by) {
+    Query query = db_->query(
+        "UPDATE tasks SET live = live + ?2 WHERE id = ?1 RETURNING job, stage, state, live, failures", id, by);
     LL_ASSIGN_OR_RETURN(const bool found, query.step());
     if (!found) return absl::DataLossError(absl::StrCat("task ", id, " is gone: restore the state from a backup"));
-    return TaskRow{.id = id,
-                   .job = query.integer(0),
-                   .stage = query.integer(1),
-                   .state = static_cast<StoredTask>(query.integer(2)),
-                   .live = query.integer(3),
-                   .failures = query.integer(4),
-                   .outputs = query.bytes(5)};
+    TaskRow row{.id = id,
+                .job = query.integer(0),
+                .stage = query.integer(1),
+                .state = static_cast<StoredTask>(query.integer(2)),
+                .live = query.integer(3),
+                .failures = query.integer(4),
+                .outputs = {}};
+    LL_RETURN_IF_ERROR(query.step().status());
+    return row;
   }
 
   absl::StatusOr<std::string> work_of_job(JobId job) {
@@ -388,13 +412,12 @@ class SqlStore final : public Store {
                      number(AttemptState::kSuperseded));
   }
 
-  /// Ends one live attempt; its task waits on. Returns the task's job.
-  absl::StatusOr<JobId> give_up(const Attempt& attempt, AttemptState state) {
+  /// Ends one live attempt; its task, which is returned, waits on.
+  absl::StatusOr<TaskRow> give_up(const Attempt& attempt, AttemptState state) {
     LL_RETURN_IF_ERROR(set_attempt(attempt.id, state));
-    LL_RETURN_IF_ERROR(db_->send("UPDATE tasks SET live = live - 1 WHERE id = ?1", attempt.task));
-    LL_ASSIGN_OR_RETURN(const TaskRow task, find_task(attempt.task));
+    LL_ASSIGN_OR_RETURN(TaskRow task, change_live(attempt.task, -1));
     LL_RETURN_IF_ERROR(progress_.count(task.job, task.live == 0 ? Counts{.ready = 1, .running = -1} : Counts{}));
-    return task.job;
+    return task;
   }
 
   const std::shared_ptr<void> held_;  // before the database: let go after it is closed
