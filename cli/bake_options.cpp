@@ -52,9 +52,13 @@ std::string BakeOptions::fixed() const {
   return threshold_ ? "--threshold" : "";
 }
 
+bool BakeOptions::keeps(const BakeParams* earlier) const {
+  const BakeMethod asked = method_ == "sl17" ? BakeMethod::kSl17 : BakeMethod::kDefault;
+  return earlier != nullptr && (method_.empty() || earlier->method == asked);
+}
+
 std::optional<TuneTarget> BakeOptions::target(const BakeParams* earlier) const {
-  const bool same_method = earlier != nullptr && (method_.empty() || earlier->method == BakeMethod::kDefault);
-  if (same_method && !retune_) return std::nullopt;
+  if (keeps(earlier) && !retune_) return std::nullopt;
   if (budget_ > 0) return TuneTarget{0, budget_};
   if (!error_ && !retune_ && !fixed().empty()) return std::nullopt;
   return TuneTarget{static_cast<double>(error_.value_or(kDefaultError)), 0};
@@ -82,7 +86,7 @@ absl::StatusOr<BakeParams> BakeOptions::tuned(const RayTracer& tracer, const Bak
 
 BakeParams BakeOptions::params(const BakeParams* earlier) const {
   BakeParams p = method_ == "sl17" ? sl17_params() : BakeParams{};
-  if (earlier != nullptr && (method_.empty() || earlier->method == p.method)) {
+  if (keeps(earlier)) {
     p = *earlier;
   } else if (earlier != nullptr) {  // another method: only what is no matter of it
     p.texels_per_metre = earlier->texels_per_metre;

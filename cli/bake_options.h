@@ -27,6 +27,8 @@ class BakeOptions {
  private:
   /// The first of the options that say how finely a level is modelled; empty: none was given.
   std::string fixed() const;
+  /// Whether the parameters of the earlier bake go on: it is of the method that is asked for.
+  bool keeps(const BakeParams* earlier) const;
 
   std::string method_;
   std::optional<int> order_, probes_, links_, rays_, relight_rays_, max_rank_, cell_receivers_, lightmap_size_;

@@ -36,12 +36,6 @@ std::optional<uint32_t> texels_of(uint64_t bytes) {
   return std::nullopt;
 }
 
-/// Index of `key` in sorted `keys`, or keys.size().
-size_t find_key(const std::pmr::vector<uint32_t>& keys, uint32_t key) {
-  const auto it = std::lower_bound(keys.begin(), keys.end(), key);
-  return it != keys.end() && *it == key ? static_cast<size_t>(it - keys.begin()) : keys.size();
-}
-
 absl::Status check_bytes(const std::string& what, const ChunkRef& ref, std::span<const uint8_t> bytes) {
   if (bytes.size() != ref.size) return corrupt(what, "its size is not the manifest's");
   if (sha256(bytes) != ref.digest) return corrupt(what, "its bytes have another SHA-256");

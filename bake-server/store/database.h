@@ -96,9 +96,9 @@ class Database {
   template <class... Args>
   absl::Status send(const char* sql, const Args&... args) {
     const std::array<Value, sizeof...(Args)> values{Value(args)...};
-    return send_statement(sql, values);
+    return send_values(sql, values);
   }
-  absl::Status send_values(const char* sql, std::span<const Value> values) { return send_statement(sql, values); }
+  virtual absl::Status send_values(const char* sql, std::span<const Value> values) = 0;
 
   /// Runs several statements that need no arguments.
   virtual absl::Status script(const char* sql) = 0;
@@ -115,7 +115,7 @@ class Database {
 
  protected:
   virtual std::unique_ptr<Rows> start(const char* sql, std::span<const Value> values) = 0;
-  virtual absl::Status send_statement(const char* sql, std::span<const Value> values) = 0;
+  bool in_transaction() const { return in_transaction_; }
 
  private:
   friend class Transaction;

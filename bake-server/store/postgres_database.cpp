@@ -6,13 +6,15 @@
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
+#include <functional>
+#include <iterator>
 #include <map>
 #include <utility>
 #include <vector>
 
 #include "bake-server/store/postgres_dialect.h"
 #include "core/base/check.h"
+#include "core/base/steady_clock.h"
 #include "core/base/text.h"
 
 namespace lightloom {
@@ -30,11 +32,6 @@ struct Clear {
   void operator()(PGresult* result) const { PQclear(result); }
 };
 using Result = std::unique_ptr<PGresult, Clear>;
-
-int64_t steady_ms() {
-  return std::chrono::duration_cast<std::chrono::milliseconds>(std::chrono::steady_clock::now().time_since_epoch())
-      .count();
-}
 
 std::string one_line(std::string_view message) {
   std::string line = escape_controls(message.substr(0, message.find('\n')));
@@ -98,9 +95,14 @@ class PostgresDatabase final : public Database {
         connection_, [](void*, const char*) {}, nullptr);
     LL_RETURN_IF_ERROR(
         plain(durability_ == Durability::kPowerLoss ? "SET synchronous_commit = on" : "SET synchronous_commit = off"));
-    LL_RETURN_IF_ERROR(read_clock());
     LL_CHECK(PQenterPipelineMode(connection_) == 1);
-    return absl::OkStatus();
+    return read_clock();
+  }
+
+  absl::Status send_values(const char* sql, std::span<const Value> values) override {
+    LL_CHECK(in_transaction());
+    LL_RETURN_IF_ERROR(push(sql, values));
+    return ahead_ < kMostAhead ? absl::OkStatus() : drain(nullptr);
   }
 
   absl::Status script(const char* sql) override {
@@ -130,7 +132,7 @@ class PostgresDatabase final : public Database {
           "SELECT setval(pg_get_serial_sequence('tasks', 'id'), GREATEST(MAX(id), 1)) FROM tasks",
           "SELECT setval(pg_get_serial_sequence('attempts', 'id'), GREATEST(MAX(id), 1)) FROM attempts",
           "SELECT setval(pg_get_serial_sequence('events', 'id'), GREATEST(MAX(id), 1)) FROM events"}) {
-      LL_RETURN_IF_ERROR(send_statement(sql, {}));
+      LL_RETURN_IF_ERROR(send_values(sql, {}));
     }
     return absl::OkStatus();
   }
@@ -142,7 +144,7 @@ class PostgresDatabase final : public Database {
   }
 
   int64_t now_ms() override {
-    const int64_t now = steady_ms() + offset_ms_.load();
+    const int64_t now = clock_() + offset_ms_.load();
     int64_t last = last_ms_.load();
     while (last < now && !last_ms_.compare_exchange_weak(last, now)) {
     }
@@ -153,37 +155,28 @@ class PostgresDatabase final : public Database {
   std::unique_ptr<Rows> start(const char* sql, std::span<const Value> values) override {
     return std::make_unique<PostgresRows>(result_of(sql, values));
   }
-  absl::Status send_statement(const char* sql, std::span<const Value> values) override {
-    LL_CHECK(transaction_);
-    LL_RETURN_IF_ERROR(push(sql, values));
-    return ahead_ < kMostAhead ? absl::OkStatus() : drain(nullptr);
-  }
 
  private:
   absl::Status begin(bool inner) override {
     if (inner) {
       LL_RETURN_IF_ERROR(undone_);
-      return send_statement("SAVEPOINT inner_one", {});
+      return send_values("SAVEPOINT inner_one", {});
     }
     LL_RETURN_IF_ERROR(usable());
-    if (steady_ms() - clock_read_ms_ > kClockEveryMs) LL_RETURN_IF_ERROR(read_clock_ahead());
+    if (clock_() - clock_read_ms_ > kClockEveryMs) LL_RETURN_IF_ERROR(read_clock());
     undone_ = absl::OkStatus();
-    transaction_ = true;
-    absl::Status status = push("BEGIN", {});
-    if (status.ok()) status = push(kLock, {});
-    if (!status.ok()) transaction_ = false;
-    return status;
+    LL_RETURN_IF_ERROR(push("BEGIN", {}));
+    return push(kLock, {});
   }
 
   absl::Status commit(bool inner) override {
     LL_RETURN_IF_ERROR(undone_);
-    if (inner) return send_statement("RELEASE inner_one", {});
+    if (inner) return send_values("RELEASE inner_one", {});
     LL_ASSIGN_OR_RETURN(const Result result, result_of("COMMIT", {}));
     // Of a transaction that has failed it says ROLLBACK.
     if (std::string_view(PQcmdStatus(result.get())) != "COMMIT") {
       return absl::AbortedError(name() + ": an earlier error has undone this change; try again");
     }
-    transaction_ = false;
     return absl::OkStatus();
   }
 
@@ -192,12 +185,11 @@ class PostgresDatabase final : public Database {
       // What failed before has undone the whole of it, which its end will say.
       if (!undone_.ok()) return;
       (void)drain(nullptr, /*expected=*/true);
-      absl::Status status = send_statement("ROLLBACK TO inner_one", {});
-      if (status.ok()) status = send_statement("RELEASE inner_one", {});
+      absl::Status status = send_values("ROLLBACK TO inner_one", {});
+      if (status.ok()) status = send_values("RELEASE inner_one", {});
       if (!status.ok()) undone_ = status;
       return;
     }
-    transaction_ = false;
     if (PQstatus(connection_) != CONNECTION_OK) return;  // the server undoes it
     (void)drain(nullptr, true);
     if (push("ROLLBACK", {}).ok()) (void)drain(nullptr, true);
@@ -206,7 +198,7 @@ class PostgresDatabase final : public Database {
   /// A connection that was lost is made anew, but not within a transaction.
   absl::Status usable() {
     if (connection_ != nullptr && PQstatus(connection_) == CONNECTION_OK) return absl::OkStatus();
-    if (transaction_) return absl::UnavailableError("the connection to " + name() + " was lost; try again");
+    if (in_transaction()) return absl::UnavailableError("the connection to " + name() + " was lost; try again");
     return connect();
   }
 
@@ -250,7 +242,6 @@ class PostgresDatabase final : public Database {
       data.push_back(bytes.empty() ? "" : bytes.data());
       lengths.push_back(static_cast<int>(bytes.size()));
       formats.push_back(types.back() == kInt8 ? 0 : kBinary);
-      if (types.back() == kInt8) data.back() = texts[i].c_str();
     }
     const auto known = prepared_.find(sql);
     std::string name;
@@ -301,7 +292,7 @@ class PostgresDatabase final : public Database {
       if (!first.ok()) prepared_.erase(sql);  // it may have been skipped
     }
     fresh_.clear();
-    if (!first.ok() && !of_last && !expected && transaction_) undone_ = first;
+    if (!first.ok() && !of_last && !expected && in_transaction()) undone_ = first;
     return first;
   }
 
@@ -311,7 +302,7 @@ class PostgresDatabase final : public Database {
     PQfinish(std::exchange(connection_, nullptr));
     absl::Status status =
         absl::UnavailableError(absl::StrCat("the connection to PostgreSQL was lost (", reason, "); try again"));
-    if (transaction_) undone_ = status;
+    if (in_transaction()) undone_ = status;
     return status;
   }
 
@@ -333,10 +324,10 @@ class PostgresDatabase final : public Database {
           absl::StrCat(name(), ": ", reason, "; give --database a user who owns the database"));
     }
     // Connections, resources, shutdown, failover, deadlocks: worth another try.
-    for (const std::string_view kind : {"", "08", "53", "57", "25006", "40"}) {
-      if (state.starts_with(kind) && (!kind.empty() || state.empty())) {
-        return absl::UnavailableError(absl::StrCat(name(), " does not answer (", reason, "); try again"));
-      }
+    constexpr std::string_view kAgain[] = {"08", "53", "57", "25006", "40"};
+    if (state.empty() ||
+        std::any_of(std::begin(kAgain), std::end(kAgain), [&](auto k) { return state.starts_with(k); })) {
+      return absl::UnavailableError(absl::StrCat(name(), " does not answer (", reason, "); try again"));
     }
     return absl::InternalError(
         absl::StrCat(name(), ": PostgreSQL error ", std::string(state), " (", reason, "): please report this"));
@@ -350,17 +341,9 @@ class PostgresDatabase final : public Database {
   }
 
   absl::Status read_clock() {
-    const Result result(PQexecParams(connection_, kNow, 0, nullptr, nullptr, nullptr, nullptr, kBinary));
-    return set_clock(*result);
-  }
-  absl::Status read_clock_ahead() {
-    LL_ASSIGN_OR_RETURN(const Result result, result_of(kNow, {}));
-    return set_clock(*result);
-  }
-  absl::Status set_clock(const PGresult& result) {
-    if (PQresultStatus(&result) != PGRES_TUPLES_OK) return in_words(result);
-    clock_read_ms_ = steady_ms();
-    offset_ms_ = integer_of(PQgetvalue(&result, 0, 0), PQgetlength(&result, 0, 0)) - clock_read_ms_;
+    LL_ASSIGN_OR_RETURN(const int64_t now_ms, number(kNow));
+    clock_read_ms_ = clock_();
+    offset_ms_ = now_ms - clock_read_ms_;
     return absl::OkStatus();
   }
 
@@ -370,9 +353,9 @@ class PostgresDatabase final : public Database {
   std::map<std::string_view, std::string> prepared_;  // by their SQL: their names
   std::vector<std::string_view> fresh_;               // of them: since answers were last read
   uint64_t next_name_ = 0;
-  size_t ahead_ = 0;          // statements that were sent and not read
-  bool transaction_ = false;  // one has begun
-  absl::Status undone_;       // the error that has undone it
+  size_t ahead_ = 0;     // statements that were sent and not read
+  absl::Status undone_;  // the error that has undone it
+  const std::function<int64_t()> clock_ = steady_unix_clock();
   int64_t clock_read_ms_ = 0;
   std::atomic<int64_t> offset_ms_ = 0, last_ms_ = 0;  // of its clock from ours
 };

@@ -126,7 +126,7 @@ std::unique_ptr<Rows> SqliteDatabase::start(const char* sql, std::span<const Val
 }
 
 /// At once: there is nobody to wait for.
-absl::Status SqliteDatabase::send_statement(const char* sql, std::span<const Value> values) {
+absl::Status SqliteDatabase::send_values(const char* sql, std::span<const Value> values) {
   const std::unique_ptr<Rows> rows = start(sql, values);
   for (bool row = true; row;) {
     LL_ASSIGN_OR_RETURN(row, rows->step());
@@ -136,7 +136,8 @@ absl::Status SqliteDatabase::send_statement(const char* sql, std::span<const Val
 
 absl::Status SqliteDatabase::error(int code) {
   absl::Status status = in_words(code);
-  if (transaction_ && undone_.ok() && sqlite3_get_autocommit(connection_) != 0) undone_ = status;
+  // A transaction that has begun, but that SQLite no longer has.
+  if (in_transaction() && undone_.ok() && sqlite3_get_autocommit(connection_) != 0) undone_ = status;
   return status;
 }
 
@@ -187,7 +188,6 @@ absl::Status SqliteDatabase::begin(bool inner) {
   if (inner && sqlite3_get_autocommit(connection_) != 0) return undone();
   // IMMEDIATE: what the transaction reads must not change before it writes.
   LL_RETURN_IF_ERROR(run(inner ? "SAVEPOINT inner_one" : "BEGIN IMMEDIATE").status());
-  transaction_ = true;
   if (!inner) undone_ = absl::OkStatus();
   return absl::OkStatus();
 }
@@ -200,12 +200,10 @@ absl::Status SqliteDatabase::undone() const {
 absl::Status SqliteDatabase::commit(bool inner) {
   if (sqlite3_get_autocommit(connection_) != 0) return undone();
   LL_RETURN_IF_ERROR(run(inner ? "RELEASE inner_one" : "COMMIT").status());
-  if (!inner) transaction_ = false;
   return absl::OkStatus();
 }
 
 void SqliteDatabase::roll_back(bool inner) {
-  if (!inner) transaction_ = false;
   if (sqlite3_get_autocommit(connection_) != 0) return;
   sqlite3_exec(connection_, inner ? "ROLLBACK TO inner_one; RELEASE inner_one" : "ROLLBACK", nullptr, nullptr, nullptr);
 }

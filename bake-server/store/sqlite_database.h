@@ -25,6 +25,7 @@ class SqliteDatabase final : public Database {
 
   const std::filesystem::path& file() const { return file_; }
 
+  absl::Status send_values(const char* sql, std::span<const Value> values) override;
   absl::Status script(const char* sql) override;
   absl::StatusOr<int64_t> schema_version() override;
   absl::StatusOr<bool> is_empty() override;
@@ -42,7 +43,6 @@ class SqliteDatabase final : public Database {
 
   explicit SqliteDatabase(std::filesystem::path file);
   std::unique_ptr<Rows> start(const char* sql, std::span<const Value> values) override;
-  absl::Status send_statement(const char* sql, std::span<const Value> values) override;
   absl::Status begin(bool inner) override;
   absl::Status commit(bool inner) override;
   void roll_back(bool inner) override;
@@ -54,7 +54,6 @@ class SqliteDatabase final : public Database {
   const std::filesystem::path file_;
   const std::function<int64_t()> clock_;
   sqlite3* connection_ = nullptr;
-  bool transaction_ = false;                         // one has begun, whether or not SQLite still has it
   absl::Status undone_;                              // the error by which SQLite ended it
   std::map<std::string_view, Prepared> statements_;  // by their SQL; std::map keeps addresses
 };

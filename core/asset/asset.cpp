@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <map>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -44,21 +43,15 @@ absl::StatusOr<std::vector<Surface*>> find_objects(const std::vector<ChunkObject
   return found;
 }
 
-/// Index into the surface's keys; none if it has no such texel.
-std::optional<size_t> find_texel(const std::vector<Surface*>& objects, TexelRef texel) {
-  const std::vector<uint32_t>& keys = objects[texel.slot]->keys;
-  const auto it = std::lower_bound(keys.begin(), keys.end(), texel.key);
-  if (it == keys.end() || *it != texel.key) return std::nullopt;
-  return static_cast<size_t>(it - keys.begin());
-}
-
 /// Codes may only name texels that their object's surface has.
 absl::Status check_codes(const std::vector<ChunkObject>& named, const std::vector<uint32_t>& texels,
                          const std::vector<Surface*>& objects, const std::string& what) {
   const TexelCodes codes(named);
   for (const uint32_t code : texels) {
     if (code == RelightChunk::kDead || code == RelightChunk::kSky) continue;
-    if (!find_texel(objects, codes.texel(code))) return mismatch(what + ": a texel that no surface has");
+    const auto [slot, key] = codes.texel(code);
+    const auto& keys = objects[slot]->keys;
+    if (find_key(keys, key) == keys.size()) return mismatch(what + ": a texel that no surface has");
   }
   return absl::OkStatus();
 }
@@ -78,11 +71,11 @@ absl::Status verify_cell(const Manifest& m, const CellEntry& entry, const CellCh
   }
   LL_ASSIGN_OR_RETURN(const std::vector<Surface*> objects, find_objects(chunk.objects, what, surfaces));
   for (const TexelRef& receiver : chunk.receivers) {
-    const auto texel = find_texel(objects, receiver);
-    if (!texel) return mismatch(what + ": a receiver that no surface has");
-    auto lit = objects[receiver.slot]->lit.begin() + static_cast<std::ptrdiff_t>(*texel);
-    if (*lit) return mismatch(what + ": a receiver that is there twice");
-    *lit = true;
+    Surface& surface = *objects[receiver.slot];
+    const size_t texel = find_key(surface.keys, receiver.key);
+    if (texel == surface.keys.size()) return mismatch(what + ": a receiver that no surface has");
+    if (surface.lit[texel]) return mismatch(what + ": a receiver that is there twice");
+    surface.lit[texel] = true;
   }
   return check_codes(chunk.objects, chunk.near_texels, objects, what);
 }

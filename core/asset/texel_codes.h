@@ -1,13 +1,21 @@
-// How a chunk names a texel by one number: base(object) + key, base being the running sum of 2·w·h over its objects.
+// How chunks name texels: by one number, base(object) + key, base being the running sum of 2·w·h over the chunk's objects.
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/asset/chunk.h"
 
 namespace lightloom {
+
+/// Index of `key` in a surface's keys, which ascend, or keys.size().
+inline size_t find_key(std::span<const uint32_t> keys, uint32_t key) {
+  const auto it = std::lower_bound(keys.begin(), keys.end(), key);
+  return it != keys.end() && *it == key ? static_cast<size_t>(it - keys.begin()) : keys.size();
+}
 
 class TexelCodes {
  public:

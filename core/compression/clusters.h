@@ -30,9 +30,9 @@ struct CompressedCell {
   double error = 0;  ///< ‖S − S̃‖ ÷ ‖S‖ over the cell, in the weighted norm
 };
 
-/// T: receivers × (probes·J), E = T·λ. `averaged`: S, rows of T averaged with their neighbours' (average.h), or T itself: V and
-/// its rank are of S, and errors are measured on it. U·Σ = T·V, so no light is blurred. A cluster whose error stays above the threshold at max_rank is split at the median
-/// of its longest axis while both halves keep min_receivers.
+/// T: receivers × (probes·J), E = T·λ. `averaged`: S, rows of T averaged with their neighbours' (average.h), or T itself: V
+/// and its rank are of S, and errors are measured on it. U·Σ = T·V, so no light is blurred. A cluster whose error stays above
+/// the threshold at max_rank is split at the median of its longest axis while both halves keep min_receivers.
 ///
 /// Errors may be measured on S·W, W falling with the band l of a column as 1/(1+l): a level's light has far less energy in
 /// high bands, and so does what truncation there costs.

@@ -107,19 +107,19 @@ class Tuner {
   /// The knee if no model errs as little as `error`.
   absl::StatusOr<Tuning> for_error(double error) {
     int step = 0;
+    bool in_reach = true;
     for (;; ++step) {
       LL_ASSIGN_OR_RETURN(const Trial* at, trial(step));
       if (at->best() <= kBandlimit * error) break;
       LL_ASSIGN_OR_RETURN(const double here, merit(step));
       LL_ASSIGN_OR_RETURN(const double finer, merit(step + 1));
       if (finer >= here) {
-        LL_ASSIGN_OR_RETURN(Tuning out, finish_best(step, &Tuner::knee));
-        out.met = out.chosen.parts.total() <= error;
-        return out;
+        in_reach = false;
+        break;
       }
     }
-    target_ = error;
-    LL_ASSIGN_OR_RETURN(Tuning out, finish_best(step, &Tuner::smallest));
+    if (in_reach) target_ = error;
+    LL_ASSIGN_OR_RETURN(Tuning out, finish_best(step, in_reach ? &Tuner::smallest : &Tuner::knee));
     out.met = out.chosen.parts.total() <= error;
     return out;
   }

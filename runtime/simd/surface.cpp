@@ -13,6 +13,9 @@
 namespace lightloom::simd {
 namespace {
 
+/// In [−limit, limit], also what a hostile asset has made NaN: std::clamp would keep that, and feedback for ever.
+float bounded(float value, float limit) { return std::min(limit, std::max(-limit, value)); }
+
 /// |a − b| > epsilon · max(|b|, floor) in any colour.
 bool differs(Vec3 a, const float* b, float epsilon, float floor) {
   bool any = false;
@@ -134,11 +137,6 @@ void Surface::find_limit() {
     limit_[c] = kPi * greatest;
   }
 }
-
-namespace {
-/// In [−limit, limit], also what a hostile asset has made NaN: std::clamp would keep that, and feedback for ever.
-float bounded(float value, float limit) { return std::min(limit, std::max(-limit, value)); }
-}  // namespace
 
 void Surface::receive(const uint32_t* elements, uint32_t count, const float* block, bool stays) {
   LL_CHECK(smoothing_ || !stays);

@@ -31,8 +31,6 @@ void run(const std::vector<std::string>& command) {
 
 }  // namespace
 
-bool PostgresServer::installed() { return !programs().empty(); }
-
 PostgresServer& PostgresServer::shared() {
   static PostgresServer server;
   return server;

@@ -18,8 +18,6 @@ class PostgresServer {
   PostgresServer(const PostgresServer&) = delete;
   PostgresServer& operator=(const PostgresServer&) = delete;
 
-  /// False: there is no PostgreSQL here.
-  static bool installed();
   /// Of this process; started when it is first asked for, ended when the process ends.
   static PostgresServer& shared();
 
