@@ -10,6 +10,6 @@ extern const std::string_view kVersion;
 
 /// Changes with any change that alters a stored byte of a bake. Part of every cache key and manifest; a
 /// worker with another one is refused.
-inline constexpr std::string_view kMethodVersion = "11";
+inline constexpr std::string_view kMethodVersion = "12";
 
 }  // namespace lightloom

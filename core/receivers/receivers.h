@@ -19,7 +19,7 @@ struct Receiver {
   uint32_t texel = 0;  ///< index into the object's TexelGrid::texels
   bool back = false;
   ShadingPoint point;  ///< TexelOpening::middle()
-  uint16_t parts = 0;  ///< TexelOpening::parts(): where its rays start
+  uint32_t parts = 0;  ///< TexelOpening::parts(): where its rays start
   uint64_t seed = 0;   ///< receiver_seed()
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <optional>
 #include <utility>
 
@@ -13,11 +14,21 @@ namespace {
 
 constexpr float kLongest = 1e6f;  // metres: no level has texels of this size
 
-/// The surface at the middle of part i, pushed off, if the surface goes that far.
-std::optional<ShadingPoint> part_middle(const Object& object, const LightmapUv& uv, const TexelGrid& grid,
-                                        const Texel& texel, bool back, int i) {
-  const auto at = [](int n) { return (static_cast<float>(n) + 0.5f) / kTexelParts; };
-  const auto p = surface_at(object, uv, grid, texel, {at(i % kTexelParts), at(i / kTexelParts)});
+constexpr size_t kParts = kTexelParts * kTexelParts;
+constexpr int kPlaceShift = 16;
+
+/// Where in each part its point lies: the middle, or the middle of a quarter.
+struct Place {
+  float x, y;
+};
+constexpr std::array<Place, 5> kPlaces{{{0.5f, 0.5f}, {0.25f, 0.25f}, {0.75f, 0.25f}, {0.25f, 0.75f}, {0.75f, 0.75f}}};
+
+/// The surface at the point of part i, pushed off, if the surface goes that far.
+std::optional<ShadingPoint> part_point(const Object& object, const LightmapUv& uv, const TexelGrid& grid,
+                                       const Texel& texel, bool back, size_t place, int i) {
+  const auto at = [](int n, float within) { return (static_cast<float>(n) + within) / kTexelParts; };
+  const auto p = surface_at(object, uv, grid, texel,
+                            {at(i % kTexelParts, kPlaces[place].x), at(i / kTexelParts, kPlaces[place].y)});
   if (!p) return std::nullopt;
   return shading_point(object, p->triangle, p->b1, p->b2, back);
 }
@@ -25,11 +36,12 @@ std::optional<ShadingPoint> part_middle(const Object& object, const LightmapUv& 
 }  // namespace
 
 std::vector<ShadingPoint> texel_points(const Object& object, const LightmapUv& uv, const TexelGrid& grid,
-                                       const Texel& texel, bool back, uint16_t parts) {
+                                       const Texel& texel, bool back, uint32_t parts) {
   std::vector<ShadingPoint> out;
   for (int i = 0; i < kTexelParts * kTexelParts; ++i) {
     if (parts != 0 && (parts >> i & 1) == 0) continue;
-    if (const auto middle = part_middle(object, uv, grid, texel, back, i)) out.push_back(*middle);
+    const auto point = part_point(object, uv, grid, texel, back, parts >> kPlaceShift, i);
+    if (point) out.push_back(*point);
   }
   if (out.empty()) out.push_back(shading_point(object, texel.triangle, texel.b1, texel.b2, back));
   return out;
@@ -39,37 +51,61 @@ TexelOpening::TexelOpening(const RayTracer& tracer, const Object& object, const 
                            const Texel& texel, bool back, uint64_t seed)
     : tracer_(tracer), object_(object), uv_(uv), texel_(texel), back_(back) {
   if (!anything_stands_on_it()) return;
-  constexpr size_t kParts = kTexelParts * kTexelParts;
-  std::array<std::optional<ShadingPoint>, kParts> middles;
-  std::array<bool, kParts> open{};
+  const auto points = [&](size_t place) {
+    Points out;
+    for (int i = 0; i < kTexelParts * kTexelParts; ++i) {
+      out[static_cast<size_t>(i)] = part_point(object, uv, grid, texel, back, place, i);
+    }
+    return out;
+  };
+  find_open_parts(points(0), seed);
+  if (parts_ != 0 || whole_) return;
+  // Nothing is open at the middles: what can be seen of it may be a strip that is narrower than a part.
+  uint32_t most = 0;
+  for (size_t place = 1; place < kPlaces.size(); ++place) {
+    TexelOpening other(*this);
+    other.find_open_parts(points(place), hash_combine(seed, place));
+    if (std::popcount(other.parts_) <= std::popcount(most)) continue;
+    most = other.parts_;
+    open_ = other.open_;
+    parts_ = most | static_cast<uint32_t>(place << kPlaceShift);
+  }
+  whole_ = parts_ == 0;
+}
+
+/// Sets parts_ and open_, or whole_ if all of them are open.
+void TexelOpening::find_open_parts(const Points& points, uint64_t seed) {
+  std::array<Space, kParts> what{};
+  what.fill(Space::kSolid);
+  const auto open = [&](size_t k) { return what[k] != Space::kSolid; };
   for (int i = 0; i < kTexelParts * kTexelParts; ++i) {
     const size_t k = static_cast<size_t>(i);
-    middles[k] = part_middle(object, uv, grid, texel, back, i);
-    if (!middles[k]) continue;
+    if (!points[k]) continue;
     // What a straight line joins is the same space: most parts need no more than one ray.
     const auto seen_from = [&](int j) {
-      const auto& other = middles[static_cast<size_t>(j)];
-      return other && tracer.visible(middles[k]->position, other->position);
+      const auto& other = points[static_cast<size_t>(j)];
+      return other && tracer_.visible(points[k]->position, other->position);
     };
     if (i % kTexelParts > 0 && seen_from(i - 1)) {
-      open[k] = open[k - 1];
+      what[k] = what[k - 1];
     } else if (i >= kTexelParts && seen_from(i - kTexelParts)) {
-      open[k] = open[k - kTexelParts];
+      what[k] = what[k - kTexelParts];
     } else {
-      open[k] = classify(tracer, *middles[k], hash_combine(seed, k)) != Space::kSolid;
+      what[k] = classify(tracer_, *points[k], hash_combine(seed, k));
     }
   }
 
-  // Something thin may keep open parts apart, such as a door that is shut: the space that has most of them counts.
+  // Something may keep open parts apart, such as a door that is shut: the space that has most of them counts, but before
+  // the void outside of a level any other.
   std::array<size_t, kParts> space{};  // of each part: the first one that it is joined with
-  std::array<size_t, kParts> size{};   // of each space, parts
+  std::array<size_t, kParts> size{};   // of each space, parts; one that is not void counts for more than all that are
   for (size_t k = 0; k < kParts; ++k) {
     space[k] = k;
-    if (!open[k]) continue;
-    size[k] = 1;
+    if (!open(k)) continue;
+    size[k] = what[k] == Space::kVoid ? 1 : kParts + 1;
     for (size_t j = k; j-- > 0;) {
       const size_t a = std::min(space[j], space[k]), b = std::max(space[j], space[k]);
-      if (!open[j] || a == b || !joined(tracer, *middles[j], *middles[k])) continue;
+      if (!open(j) || a == b || !joined(tracer_, *points[j], *points[k])) continue;
       std::replace(space.begin(), space.begin() + static_cast<std::ptrdiff_t>(k) + 1, b, a);
       size[a] += std::exchange(size[b], 0);
     }
@@ -77,15 +113,14 @@ TexelOpening::TexelOpening(const RayTracer& tracer, const Object& object, const 
   const size_t largest = static_cast<size_t>(std::max_element(size.begin(), size.end()) - size.begin());
   whole_ = true;
   for (size_t k = 0; k < kParts; ++k) {
-    if (!middles[k]) continue;
-    if (open[k] && space[k] == largest) {
-      open_.push_back(*middles[k]);
-      parts_ = static_cast<uint16_t>(parts_ | 1u << k);
+    if (!points[k]) continue;
+    if (open(k) && space[k] == largest) {
+      open_.push_back(*points[k]);
+      parts_ |= 1u << k;
     } else {
       whole_ = false;
     }
   }
-  if (open_.empty()) whole_ = true;
   if (whole_) parts_ = 0;
 }
 

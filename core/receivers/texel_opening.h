@@ -2,7 +2,9 @@
 // averaged over what can be seen. Nor may it be averaged over both sides of a sheet.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "core/receivers/surface_point.h"
@@ -14,10 +16,10 @@ namespace lightloom {
 /// A texel is tested in kTexelParts × kTexelParts parts.
 inline constexpr int kTexelParts = 4;
 
-/// The middles of a texel's parts, pushed off the surface, at least one: averages over them stand for the texel. `parts` as
-/// TexelOpening::parts() has them.
+/// A point of each of a texel's parts, pushed off the surface, at least one: averages over them stand for the texel. `parts`
+/// as TexelOpening::parts() has them.
 std::vector<ShadingPoint> texel_points(const Object& object, const LightmapUv& uv, const TexelGrid& grid,
-                                       const Texel& texel, bool back, uint16_t parts);
+                                       const Texel& texel, bool back, uint32_t parts);
 
 class TexelOpening {
  public:
@@ -29,12 +31,17 @@ class TexelOpening {
   bool whole() const { return whole_; }
   /// Whether a point of the texel lies in open space.
   bool contains(const SurfacePoint& point) const;
-  /// A bit for each of its parts that lie in the same open space, the one that has most of them; 0 if it is whole.
-  uint16_t parts() const { return parts_; }
+  /// A bit for each of its parts that lie in the same open space, the one that has most of them; 0 if it is whole. Above
+  /// these 16 bits: where in each part its point lies, 0 the middle, 1 to 4 the middles of its quarters, which are looked at
+  /// where no middle is open.
+  uint32_t parts() const { return parts_; }
   /// The middle of the open part that lies most in the midst of them; the texel's own point if it is whole.
   ShadingPoint middle() const;
 
  private:
+  using Points = std::array<std::optional<ShadingPoint>, size_t{kTexelParts} * kTexelParts>;
+
+  void find_open_parts(const Points& points, uint64_t seed);
   ShadingPoint lifted(const SurfacePoint& p) const { return shading_point(object_, p.triangle, p.b1, p.b2, back_); }
   bool anything_stands_on_it() const;
 
@@ -44,8 +51,8 @@ class TexelOpening {
   const Texel& texel_;
   bool back_;
   bool whole_ = true;
-  uint16_t parts_ = 0;
-  std::vector<ShadingPoint> open_;  ///< middles of the open parts, if it is not whole
+  uint32_t parts_ = 0;
+  std::vector<ShadingPoint> open_;  ///< points of the open parts, if it is not whole
 };
 
 }  // namespace lightloom

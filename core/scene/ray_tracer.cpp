@@ -21,40 +21,19 @@ struct GeometryContext {
   bool has_mask = false;
 };
 
+/// Embree's distances come from estimates of reciprocals, which differ between CPU makers, and are off by more where a
+/// triangle is thin or hit at a grazing angle. Hits nearer to each other than this, relatively, are told apart by
+/// recompute().
+constexpr float kTie = 0x1p-14f;
+
 /// Extends Embree's context by the nearest hit accepted so far, to settle ties.
 struct QueryContext {
   RTCIntersectContext embree;
-  float t = std::numeric_limits<float>::infinity();
-  uint64_t key = ~0ull;
+  float t_max = 0;
+  const GeometryContext* nearest = nullptr;
+  uint32_t primitive = 0;
+  float t = 0;  // by Embree
 };
-
-bool passes_mask(const GeometryContext& g, uint32_t primitive, float b1, float b2) {
-  return !g.has_mask || opaque_at(*g.scene, *g.object, g.object->triangles[primitive], b1, b2);
-}
-
-// Equal distances: the triangle with the smaller (object content, index) wins, whatever order the BVH visits them in.
-void filter_closest(const RTCFilterFunctionNArguments* args) {
-  const auto& g = *static_cast<const GeometryContext*>(args->geometryUserPtr);
-  auto* query = reinterpret_cast<QueryContext*>(args->context);
-  const uint32_t primitive = RTCHitN_primID(args->hit, args->N, 0);
-  const float t = RTCRayN_tfar(args->ray, args->N, 0);
-  const uint64_t key = static_cast<uint64_t>(g.content_rank) << 32 | primitive;
-  const bool loses_tie = t == query->t && key > query->key;
-  if (loses_tie || !passes_mask(g, primitive, RTCHitN_u(args->hit, args->N, 0), RTCHitN_v(args->hit, args->N, 0))) {
-    args->valid[0] = 0;
-    return;
-  }
-  query->t = t;
-  query->key = key;
-}
-
-void filter_occluded(const RTCFilterFunctionNArguments* args) {
-  const auto& g = *static_cast<const GeometryContext*>(args->geometryUserPtr);
-  if (!passes_mask(g, RTCHitN_primID(args->hit, args->N, 0), RTCHitN_u(args->hit, args->N, 0),
-                   RTCHitN_v(args->hit, args->N, 0))) {
-    args->valid[0] = 0;
-  }
-}
 
 RTCRay make_ray(Vec3 o, Vec3 d, float t_max) {
   RTCRay ray{};
@@ -88,6 +67,56 @@ void recompute(Vec3 o, Vec3 d, Vec3 p0, Vec3 p1, Vec3 p2, Hit* hit) {
   hit->t = static_cast<float>(std::max(0.0, dt(e2, q) / det));
   hit->b1 = static_cast<float>(b1);
   hit->b2 = static_cast<float>(b2);
+}
+
+/// What a filter is asked about, as no CPU maker has it otherwise.
+Hit exact_hit(const RTCFilterFunctionNArguments* args, const GeometryContext& g, uint32_t primitive) {
+  const auto& v = g.object->triangles[primitive].v;
+  const auto& p = g.object->positions;
+  Hit hit;
+  hit.t = RTCRayN_tfar(args->ray, args->N, 0);
+  hit.b1 = RTCHitN_u(args->hit, args->N, 0);
+  hit.b2 = RTCHitN_v(args->hit, args->N, 0);
+  recompute({RTCRayN_org_x(args->ray, args->N, 0), RTCRayN_org_y(args->ray, args->N, 0),
+             RTCRayN_org_z(args->ray, args->N, 0)},
+            {RTCRayN_dir_x(args->ray, args->N, 0), RTCRayN_dir_y(args->ray, args->N, 0),
+             RTCRayN_dir_z(args->ray, args->N, 0)},
+            p[v[0]], p[v[1]], p[v[2]], &hit);
+  return hit;
+}
+
+/// By distance, then by the content of what is hit: neither the BVH nor the order of objects shows.
+std::pair<float, uint64_t> order_of(const RTCFilterFunctionNArguments* args, const GeometryContext& g,
+                                    uint32_t primitive) {
+  return {exact_hit(args, g, primitive).t, static_cast<uint64_t>(g.content_rank) << 32 | primitive};
+}
+
+bool passes_mask(const RTCFilterFunctionNArguments* args, const GeometryContext& g, uint32_t primitive) {
+  if (!g.has_mask) return true;
+  const Hit hit = exact_hit(args, g, primitive);
+  return opaque_at(*g.scene, *g.object, g.object->triangles[primitive], hit.b1, hit.b2);
+}
+
+void filter_closest(const RTCFilterFunctionNArguments* args) {
+  const auto& g = *static_cast<const GeometryContext*>(args->geometryUserPtr);
+  auto* query = reinterpret_cast<QueryContext*>(args->context);
+  const uint32_t primitive = RTCHitN_primID(args->hit, args->N, 0);
+  float& t_far = RTCRayN_tfar(args->ray, args->N, 0);
+  const bool near_tie = query->nearest && t_far >= query->t * (1 - kTie);
+  if ((near_tie && order_of(args, *query->nearest, query->primitive) < order_of(args, g, primitive)) ||
+      !passes_mask(args, g, primitive)) {
+    args->valid[0] = 0;
+    return;
+  }
+  query->nearest = &g;
+  query->primitive = primitive;
+  query->t = t_far;
+  t_far = std::min(t_far * (1 + kTie), query->t_max);  // so that Embree shows what comes next to it, too
+}
+
+void filter_occluded(const RTCFilterFunctionNArguments* args) {
+  const auto& g = *static_cast<const GeometryContext*>(args->geometryUserPtr);
+  if (!passes_mask(args, g, RTCHitN_primID(args->hit, args->N, 0))) args->valid[0] = 0;
 }
 
 }  // namespace
@@ -175,6 +204,7 @@ absl::StatusOr<std::unique_ptr<RayTracer>> RayTracer::create(const Scene& scene)
 Hit RayTracer::closest(Vec3 origin, Vec3 direction, float t_max) const {
   QueryContext query;
   rtcInitIntersectContext(&query.embree);
+  query.t_max = t_max;
   RTCRayHit rayhit{};
   rayhit.ray = make_ray(origin, direction, t_max);
   rayhit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
@@ -183,7 +213,7 @@ Hit RayTracer::closest(Vec3 origin, Vec3 direction, float t_max) const {
   if (rayhit.hit.geomID == RTC_INVALID_GEOMETRY_ID) return hit;
   hit.object = rayhit.hit.geomID;
   hit.triangle = rayhit.hit.primID;
-  hit.t = rayhit.ray.tfar;
+  hit.t = query.t;
   hit.b1 = rayhit.hit.u;
   hit.b2 = rayhit.hit.v;
   const Object& object = impl_->scene->objects[hit.object];

@@ -1,8 +1,8 @@
 // Rays against the static geometry of a scene. Embree stands behind it; no Embree type shows.
 //
 // Hits are a pure function of the triangles near the ray: Embree runs with RTC_SCENE_FLAG_ROBUST and a pinned
-// instruction set, equal distances are settled by the triangle's content, and t and the barycentrics are recomputed from
-// the triangle with IEEE division.
+// instruction set, t and the barycentrics are recomputed from the triangle with IEEE division, and of hits at nearly the
+// same distance the recomputed t decides, or the triangle's content where it is equal.
 #pragma once
 
 #include <cstdint>
