@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/base/check.h"
 #include "core/receivers/open_space.h"
 #include "core/receivers/surface_point.h"
 
@@ -37,10 +38,12 @@ std::optional<ShadingPoint> part_point(const Object& object, const LightmapUv& u
 
 std::vector<ShadingPoint> texel_points(const Object& object, const LightmapUv& uv, const TexelGrid& grid,
                                        const Texel& texel, bool back, uint32_t parts) {
+  const size_t place = parts >> kPlaceShift;
+  LL_CHECK(place < kPlaces.size());
   std::vector<ShadingPoint> out;
   for (int i = 0; i < kTexelParts * kTexelParts; ++i) {
     if (parts != 0 && (parts >> i & 1) == 0) continue;
-    const auto point = part_point(object, uv, grid, texel, back, parts >> kPlaceShift, i);
+    const auto point = part_point(object, uv, grid, texel, back, place, i);
     if (point) out.push_back(*point);
   }
   if (out.empty()) out.push_back(shading_point(object, texel.triangle, texel.b1, texel.b2, back));
@@ -61,9 +64,10 @@ TexelOpening::TexelOpening(const RayTracer& tracer, const Object& object, const 
   find_open_parts(points(0), seed);
   if (parts_ != 0 || whole_) return;
   // Nothing is open at the middles: what can be seen of it may be a strip that is narrower than a part.
+  const TexelOpening closed(*this);
   uint32_t most = 0;
   for (size_t place = 1; place < kPlaces.size(); ++place) {
-    TexelOpening other(*this);
+    TexelOpening other(closed);
     other.find_open_parts(points(place), hash_combine(seed, place));
     if (std::popcount(other.parts_) <= std::popcount(most)) continue;
     most = other.parts_;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <functional>
 #include <memory>
@@ -12,6 +13,7 @@
 
 #include "core/receivers/receiver_search.h"
 #include "core/receivers/texel_opening.h"
+#include "core/scene/shapes.h"
 #include "tests/support/test_scenes.h"
 
 namespace lightloom {
@@ -326,6 +328,52 @@ TEST(FindReceivers, ATexelThatACurtainCutsStandsForOneSide) {
     EXPECT_GE(from.size(), 4u);
   }
   EXPECT_GE(cut, 30) << "of 40; a few see more of the curtain's back than of anything else, and count as solid";
+}
+
+/// A room with a box in it.
+Scene room_with_box(Vec3 lo, Vec3 hi) {
+  Scene scene = test::closed_box({4, 3, 4});
+  Object& box = scene.objects.emplace_back();
+  box.name = "box";
+  add_box(&box, lo, hi, test::add_material(&scene, "paint", {0.5f, 0.5f, 0.5f}));
+  test::identify(&scene);
+  return scene;
+}
+
+TEST(FindReceivers, StripsOfTexelsNarrowerThanTheirPartsAreFound) {
+  int found = 0;
+  for (float gap = 0.02f; gap < 0.2f; gap += 0.02f) {
+    const World w(room_with_box({gap, -0.1f, 0.5f}, {3.5f, 1, 3.5f}), 1);
+    for (const Receiver& r : w.receivers.all) {
+      if (r.object != w.object("floor") || r.parts >> 16 == 0) continue;
+      ++found;
+      const TexelGrid& grid = w.receivers.grids[r.object];
+      const auto from =
+          texel_points(w.scene.objects[r.object], w.layout.uv[r.object], grid, grid.texels[r.texel], r.back, r.parts);
+      EXPECT_EQ(from.size(), static_cast<size_t>(std::popcount(r.parts & 0xffff)));
+      bool has_middle = false;
+      for (const ShadingPoint& p : from) {
+        const Vec3 at = p.position;
+        EXPECT_FALSE(at.x > gap && at.x < 3.5f && at.z > 0.5f && at.z < 3.5f) << at.x << ' ' << at.z;
+        has_middle |= at == r.point.position;
+      }
+      EXPECT_TRUE(has_middle);
+    }
+  }
+  EXPECT_GE(found, 4);
+}
+
+TEST(FindReceivers, NoTexelWithAStripInTheRoomStandsForTheVoid) {
+  int astride = 0;
+  for (float density = 1.5f; density < 4; density += 0.25f) {
+    const World w(room_with_box({-0.22f, 0.5f, 1}, {0.22f, 2, 1.44f}), density);
+    for (const Receiver& r : w.receivers.all) {
+      if (r.object != w.object("box") || r.parts == 0) continue;
+      astride += std::abs(r.point.geometric.z) > 0.5f;
+      EXPECT_GT(r.point.position.x, 0) << density;
+    }
+  }
+  EXPECT_GE(astride, 8);
 }
 
 TEST(Locate, NeverAnotherChartThatSharesTheTexel) {
