@@ -24,6 +24,8 @@ class BlobLayout {
   /// A blob that nobody seems to need, for the moment in which the last look is taken. Whoever looks for it puts it back.
   std::filesystem::path trash() const { return folder_ / "trash"; }
   std::filesystem::path discarded(const Digest& digest) const { return trash() / digest.hex(); }
+  /// Files that were found to hold other bytes than their names say, kept to be looked at.
+  std::filesystem::path damaged() const { return folder_ / "damaged"; }
 
  private:
   std::filesystem::path folder_;

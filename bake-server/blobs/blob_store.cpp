@@ -155,6 +155,17 @@ absl::StatusOr<std::vector<uint8_t>> BlobStore::read(const Digest& digest, uint6
   return absl::NotFoundError("there is no blob " + digest.hex());
 }
 
+void BlobStore::set_damaged_aside(const Digest& digest) {
+  const auto mine = turn(digest);
+  const std::lock_guard lock(*mine);
+  const fs::path path = layout_.blob(digest);
+  // Somebody may have put a right one there since.
+  if (const auto found = digest_of(path); !found.ok() || *found == digest) return;
+  std::error_code error;
+  fs::create_directories(layout_.damaged(), error);
+  fs::rename(path, layout_.damaged() / digest.hex(), error);
+}
+
 uint64_t BlobStore::uploaded(const Digest& digest) const {
   return has(digest) ? size(digest).value_or(0) : bytes_in(layout_.part(digest));
 }

@@ -1,5 +1,7 @@
 #include "bake-server/grpc/blob_service.h"
 
+#include <spdlog/spdlog.h>
+
 #include <optional>
 
 #include "bake-server/grpc/translate.h"
@@ -10,6 +12,13 @@ namespace {
 
 constexpr uint64_t kPiece = uint64_t{1} << 20;
 constexpr int kMostDigests = 8192;
+
+/// NotFound, and so nobody asks for it once more.
+absl::Status damaged(const Digest& digest) {
+  return absl::NotFoundError("blob " + digest.hex() +
+                             " was damaged on the server's disk and is set aside; submit the job again: what is "
+                             "missing is baked anew");
+}
 
 /// Takes blobs piece by piece; what arrived before a cut is kept.
 class Writing final : public grpc::ServerReadReactor<v1::WriteRequest> {
@@ -71,7 +80,8 @@ class Writing final : public grpc::ServerReadReactor<v1::WriteRequest> {
 
 class Reading final : public grpc::ServerWriteReactor<v1::ReadResponse> {
  public:
-  Reading(const BlobStore* store, const v1::ReadRequest& request) : store_(store), offset_(request.offset()) {
+  Reading(BlobStore* store, const v1::ReadRequest& request) : store_(store), offset_(request.offset()) {
+    whole_ = offset_ == 0;
     const auto lock = hand_over_.hold();
     const auto digest = to_digest(request.digest());
     if (!digest.ok()) {
@@ -99,18 +109,28 @@ class Reading final : public grpc::ServerWriteReactor<v1::ReadResponse> {
     }
     const auto bytes = store_->read(digest_, offset_, kPiece);
     if (!bytes.ok() || bytes->empty()) {
-      Finish(to_grpc(bytes.status()));
+      Finish(to_grpc(bytes.ok() ? check() : bytes.status()));
       return;
     }
+    if (whole_) hasher_.bytes(bytes->data(), bytes->size());
     offset_ += bytes->size();
     piece_.set_data(bytes->data(), bytes->size());
     StartWrite(&piece_);
   }
 
+  absl::Status check() {
+    if (!whole_ || hasher_.finish() == digest_) return absl::OkStatus();
+    spdlog::error("blob " + digest_.hex() + " is damaged: its disk should be looked at");
+    store_->set_damaged_aside(digest_);
+    return damaged(digest_);
+  }
+
   HandOver hand_over_;
-  const BlobStore* store_;
+  BlobStore* store_;
   Digest digest_;
   uint64_t offset_;
+  bool whole_ = false;  // read from its beginning
+  Hasher hasher_;       // of what was read
   v1::ReadResponse piece_;
 };
 

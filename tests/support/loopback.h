@@ -2,7 +2,6 @@
 #pragma once
 
 #include <arpa/inet.h>
-#include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -68,58 +67,6 @@ class Answering {
   Listener listener_;
   std::function<void(int)> serve_;
   std::thread thread_;
-};
-
-/// A way to a server on this machine that breaks once, after so many bytes of the client.
-class CuttingProxy {
- public:
-  CuttingProxy(const std::string& server, uint64_t cut_after)
-      : port_(static_cast<uint16_t>(std::stoi(server.substr(server.rfind(':') + 1)))),
-        cut_after_(cut_after),
-        front_([this](int client) { serve(client); }) {}
-
-  const std::string& address() const { return front_.address(); }
-  bool was_cut() const { return cut_; }
-  /// From clients to the server, on all connections.
-  uint64_t bytes() const { return bytes_; }
-
- private:
-  void serve(int client) {
-    const int server = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    const sockaddr_in at = loopback(port_);
-    if (::connect(server, reinterpret_cast<const sockaddr*>(&at), sizeof at) == 0) {
-      pollfd ends[2] = {{client, POLLIN, 0}, {server, POLLIN, 0}};
-      while (::poll(ends, 2, -1) > 0) {
-        if (ends[0].revents != 0 && !(pump(client, server, true) && go_on())) break;
-        if (ends[1].revents != 0 && !pump(server, client, false)) break;
-      }
-    }
-    ::close(server);
-  }
-  bool pump(int from, int to, bool count) {
-    char bytes[1 << 16];
-    const ssize_t n = ::read(from, bytes, sizeof bytes);
-    if (n <= 0) return false;
-    if (count) bytes_ += static_cast<uint64_t>(n);
-    for (ssize_t done = 0; done < n;) {
-      const ssize_t sent = ::send(to, bytes + done, static_cast<size_t>(n - done), MSG_NOSIGNAL);
-      if (sent <= 0) return false;
-      done += sent;
-    }
-    return true;
-  }
-  /// False when the connection is to be cut.
-  bool go_on() {
-    if (cut_ || bytes_ < cut_after_) return true;
-    cut_ = true;
-    return false;
-  }
-
-  const uint16_t port_;
-  const uint64_t cut_after_;
-  std::atomic<uint64_t> bytes_{0};
-  std::atomic<bool> cut_{false};
-  Answering front_;  // last: its thread uses the others
 };
 
 }  // namespace lightloom::test
