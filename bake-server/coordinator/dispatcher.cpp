@@ -11,6 +11,7 @@ namespace {
 constexpr uint32_t kReadyPerJob = 256;        // tasks of a job that are looked at when some are given out
 constexpr int64_t kForgetWorkerMs = 600'000;  // that has said nothing for so long
 constexpr uint32_t kMaxLive = 2;              // attempts at a task: one, and one more if it takes long
+constexpr uint32_t kSuspect = 3;              // tasks in a row that a worker failed: what others failed is not for it
 
 SyncFacts facts_of(const SyncMessage& message) {
   SyncFacts facts{message.incarnation, message.sequence, message.seen, {}};
@@ -86,8 +87,10 @@ absl::Status Dispatcher::record(const SyncMessage& message, Worker* worker, Sync
       rays_.add(held->second.job, f.rays);
     }
     acknowledge(f.attempt);
+    worker->failed_in_row = 0;
   }
   for (const auto& f : message.failed) {
+    ++worker->failed_in_row;
     LL_RETURN_IF_ERROR(store_->fail(f.attempt, f.reason, now_ms, options_.max_failures).status());
     acknowledge(f.attempt);
   }
@@ -178,10 +181,12 @@ absl::Status Dispatcher::give_out(int64_t now_ms) {
     if (job.ready.empty() && job.live > 0) waiting.push_back(job.id);
   }
   std::vector<std::string> present;
+  std::set<std::string> suspects;
   for (const auto& [id, worker] : workers_) {
     if (!worker.draining && now_ms - worker.heard_ms <= options_.lease_ms) present.push_back(id);
+    if (worker.failed_in_row >= kSuspect) suspects.insert(id);
   }
-  for (const Decision& d : decide(std::move(view), std::move(demands), now_ms, options_.decide, present)) {
+  for (const Decision& d : decide(std::move(view), std::move(demands), now_ms, options_.decide, present, suspects)) {
     const NewLease lease{d.task, d.worker, options_.new_token(), now_ms + options_.lease_ms, kMaxLive};
     // First, so that nothing is leased that cannot be told.
     LL_ASSIGN_OR_RETURN(Assignment assigned, assignment(d.task, lease.token, priorities.at(d.job)));

@@ -116,6 +116,7 @@ class Dispatcher {
     std::string version;
     uint32_t threads = 0;
     bool draining = false;
+    uint32_t failed_in_row = 0;
     int64_t heard_ms = 0;
     std::map<std::string, Held> held;  // by attempt
     std::set<JobId> warmed;            // that it was told of before it got their tasks

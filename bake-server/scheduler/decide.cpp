@@ -11,8 +11,9 @@ namespace {
 
 class Deciding {
  public:
-  Deciding(std::vector<JobView> jobs, std::set<std::string> workers, int64_t now_ms, const DecideOptions& options)
-      : jobs_(std::move(jobs)), workers_(std::move(workers)), now_ms_(now_ms), options_(options) {
+  Deciding(std::vector<JobView> jobs, std::set<std::string> workers, const std::set<std::string>& suspects,
+           int64_t now_ms, const DecideOptions& options)
+      : jobs_(std::move(jobs)), workers_(std::move(workers)), suspects_(suspects), now_ms_(now_ms), options_(options) {
     for (const JobView& job : jobs_) {
       priority_[job.id] = job.priority;
       out_of_client_[job.client] += job.live;
@@ -63,6 +64,11 @@ class Deciding {
     const auto failed = [&](const std::string& w) {
       return std::find(task.failed_by.begin(), task.failed_by.end(), w) != task.failed_by.end();
     };
+    if (!task.failed_by.empty() && suspects_.contains(worker) &&
+        std::any_of(workers_.begin(), workers_.end(),
+                    [&](const std::string& w) { return !suspects_.contains(w) && !failed(w); })) {
+      return false;
+    }
     return !failed(worker) || std::all_of(workers_.begin(), workers_.end(), failed);
   }
   bool has_one_for(const JobView& job, const std::string& worker) const {
@@ -115,6 +121,7 @@ class Deciding {
 
   std::vector<JobView> jobs_;
   std::set<std::string> workers_;
+  const std::set<std::string>& suspects_;
   int64_t now_ms_;
   DecideOptions options_;
   std::map<JobId, int32_t> priority_;
@@ -126,10 +133,11 @@ class Deciding {
 }  // namespace
 
 std::vector<Decision> decide(std::vector<JobView> jobs, std::vector<Demand> demands, int64_t now_ms,
-                             const DecideOptions& options, const std::vector<std::string>& others) {
+                             const DecideOptions& options, const std::vector<std::string>& others,
+                             const std::set<std::string>& suspects) {
   std::set<std::string> workers(others.begin(), others.end());
   for (const Demand& demand : demands) workers.insert(demand.worker);
-  Deciding deciding(std::move(jobs), std::move(workers), now_ms, options);
+  Deciding deciding(std::move(jobs), std::move(workers), suspects, now_ms, options);
   std::vector<Decision> out;
   // In turns, so that a worker with many threads does not take all.
   for (bool gave = true; gave;) {

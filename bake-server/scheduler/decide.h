@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -39,8 +40,10 @@ struct Decision {
 /// behind those it runs, gets one of higher priority all the same while it has fewer such than threads: it starts it
 /// with the next thread that is free.
 /// Who failed a task gets it no more while there is a worker that did not. `others`: workers that are there, but do not
-/// ask now.
+/// ask now. `suspects`: workers that failed all they had of late. What has failed before goes to one of the rest, if any of
+/// them has not failed it: a few broken workers must not fail a task for good between them.
 std::vector<Decision> decide(std::vector<JobView> jobs, std::vector<Demand> demands, int64_t now_ms,
-                             const DecideOptions& options = {}, const std::vector<std::string>& others = {});
+                             const DecideOptions& options = {}, const std::vector<std::string>& others = {},
+                             const std::set<std::string>& suspects = {});
 
 }  // namespace lightloom

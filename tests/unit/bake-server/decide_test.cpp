@@ -107,6 +107,20 @@ TEST(Decide, WorkersStayInRunsOfTheirOwn) {
   EXPECT_THAT(orders(decide({later}, {{"w", 2, 1, 25}}, 0, options), "w"), ElementsAre(24, 25));
 }
 
+TEST(Decide, WhatHasFailedIsNotForSuspects) {
+  JobView once = job(1, 2);
+  once.ready[0].failed_by = {"broken"};
+  const std::set<std::string> suspects{"broken", "also broken"};
+  const std::vector<std::string> others{"broken", "sound"};
+  EXPECT_THAT(orders(decide({once}, {{"also broken", 2}}, 0, {}, others, suspects), "also broken"), ElementsAre(1));
+  EXPECT_THAT(orders(decide({once}, {{"also broken", 2}}, 0, {}, others), "also broken"), ElementsAre(0, 1));
+  EXPECT_THAT(orders(decide({once}, {{"sound", 2}}, 0, {}, {"broken"}, suspects), "sound"), ElementsAre(0, 1));
+  // If the sound ones have failed it too, or are gone, it is for anyone.
+  once.ready[0].failed_by = {"broken", "sound"};
+  EXPECT_EQ(decide({once}, {{"also broken", 2}}, 0, {}, others, suspects).size(), 2u);
+  EXPECT_EQ(decide({once}, {{"also broken", 2}}, 0, {}, {"broken"}, suspects).size(), 2u);
+}
+
 TEST(Decide, StragglersAreLeasedOnceMoreWhenNothingElseIsLeft) {
   JobView end = job(1, 0);
   end.running = {{7, 0, 1, 5'000, {"v"}}, {8, 1, 1, 1'000, {"v"}}, {9, 2, 2, 0, {"u", "v"}}, {10, 3, 1, 0, {"w"}}};
