@@ -2,9 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <filesystem>
 #include <set>
 #include <string>
 
+#include "bake-server/upkeep/backup.h"
 #include "tests/cluster/farm_fixture.h"
 #include "tests/support/postgres_server.h"
 
@@ -77,6 +79,38 @@ TEST_F(CoordinatorsTest, OneDiesAndTheOtherFinishes) {
   });
   EXPECT_TRUE(died);
   EXPECT_EQ(ended.state, "done");
+  expect_fetched_as_baked(job.id);
+}
+
+TEST_F(CoordinatorsTest, ABackupFromTheMiddleOfAJobGoesOnInAnotherDatabase) {
+  const std::filesystem::path state = folder_.path() / "state", copy = folder_.path() / "copy";
+  const RemoteJob job = submit();
+  {
+    const RunningWorker worker(dial(address()), "worker");
+    bool copied = false;
+    EXPECT_EQ(watch(job.id,
+                    [&](const RemoteJob& now) {
+                      if (copied || now.done < 3 || now.ended()) return;
+                      copied = true;
+                      EXPECT_GT(value_or_die(back_up(state, copy, nullptr, database_)).blobs, 2u);
+                    })
+                  .state,
+              "done");
+    ASSERT_TRUE(copied);
+  }
+  stop_other();
+  stop_server();
+  std::filesystem::remove_all(state);
+  std::filesystem::rename(copy, state);
+  database_ = PostgresServer::shared().database("restored");
+  ASSERT_TRUE(restore(state, database_).ok());
+  start_server("127.0.0.1:0");
+  FarmClient client(address());
+  const RemoteJob there = value_or_die(client.job(job.id));
+  EXPECT_EQ(there.state, "running");
+  EXPECT_GE(there.done, 3u);
+  const RunningWorker worker(dial(address()), "another");
+  EXPECT_EQ(watch(job.id).state, "done");
   expect_fetched_as_baked(job.id);
 }
 

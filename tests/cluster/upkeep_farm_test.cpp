@@ -2,6 +2,7 @@
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sqlite3.h>
 #include <sys/stat.h>
 
 #include <atomic>
@@ -13,6 +14,7 @@
 #include "bake-server/upkeep/backup.h"
 #include "core/base/steady_clock.h"
 #include "tests/cluster/farm_fixture.h"
+#include "tests/support/previous_schema.h"
 
 namespace lightloom {
 namespace {
@@ -110,6 +112,39 @@ TEST_F(UpkeepFarm, ABackupFromTheMiddleOfAJobGoesOnElsewhere) {
   stop_server();
   fs::remove_all(state());
   fs::rename(folder_.path() / "copy", state());
+  start_server("127.0.0.1:0");
+  FarmClient client(address());
+  const RemoteJob there = value_or_die(client.job(job.id));
+  EXPECT_EQ(there.state, "running");
+  EXPECT_GE(there.done, 3u);
+  const RunningWorker worker(dial(address()), "another");
+  const RemoteJob end = watch(job.id);
+  ASSERT_EQ(end.state, "done") << end.error;
+  expect_fetched_as_baked(job.id);
+}
+
+TEST_F(UpkeepFarm, AJobThatTheReleaseBeforeBeganIsFinished) {
+  const RemoteJob job = submit();
+  {
+    const RunningWorker worker(dial(address()), "worker");
+    bool stopped = false;
+    FarmClient client(address(), std::chrono::seconds(1));
+    const CancelFlag never;
+    // The watch ends with the server.
+    (void)client.watch(job.id, never, [&](const RemoteJob& now) {
+      if (stopped || now.done < 3 || now.ended()) return;
+      stopped = true;
+      stop_server();
+    });
+    ASSERT_TRUE(stopped);
+  }
+  sqlite3* database = nullptr;
+  ASSERT_EQ(sqlite3_open((state() / "store.db").c_str(), &database), SQLITE_OK);
+  for (const char* sql : test::kBackToSchema1) {
+    EXPECT_EQ(sqlite3_exec(database, sql, nullptr, nullptr, nullptr), SQLITE_OK) << sql;
+  }
+  sqlite3_close(database);
+
   start_server("127.0.0.1:0");
   FarmClient client(address());
   const RemoteJob there = value_or_die(client.job(job.id));

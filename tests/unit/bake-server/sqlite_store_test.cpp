@@ -10,6 +10,7 @@
 #include <fstream>
 #include <functional>
 
+#include "tests/support/previous_schema.h"
 #include "tests/unit/bake-server/store_fixture.h"
 
 namespace lightloom::test {
@@ -110,7 +111,6 @@ TEST_F(SqliteStoreTest, OutputsThatAreGoneAreNotUsedAgain) {
   EXPECT_EQ(value(store->submit(new_job("t", {cell(0, 0)}), 40)).state, JobState::kRunning);
 }
 
-/// What version 1 had: version 2 without what it added.
 TEST_F(SqliteStoreTest, TheSchemaBeforeIsBroughtUp) {
   auto store = value(open_sqlite_store(folder_.path()));
   const JobId old = value(store->submit(new_job("r", {cell(0, 0), cell(1, 1)}), 1)).id;
@@ -118,11 +118,7 @@ TEST_F(SqliteStoreTest, TheSchemaBeforeIsBroughtUp) {
   EXPECT_EQ(value(store->complete("a", {digest(1)}, {}, 20)), Completion::kAccepted);
   EXPECT_TRUE(value(store->lease({2, "w", "b", 100, 1}, 10)));
   store.reset();
-  for (const char* sql : {"DROP INDEX tasks_results", "DROP INDEX tasks_spawned", "ALTER TABLE jobs DROP COLUMN work",
-                          "ALTER TABLE progress DROP COLUMN reused", "ALTER TABLE tasks DROP COLUMN key",
-                          "ALTER TABLE tasks DROP COLUMN spawner", "PRAGMA user_version = 1"}) {
-    execute(sql);
-  }
+  for (const char* sql : kBackToSchema1) execute(sql);
   store = value(open_sqlite_store(folder_.path()));
   EXPECT_EQ(value(store->complete("b", {digest(2)}, {}, 30)), Completion::kAccepted);
   EXPECT_EQ(value(store->job(old)).state, JobState::kDone);
