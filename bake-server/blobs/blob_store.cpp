@@ -110,11 +110,23 @@ absl::StatusOr<std::unique_ptr<BlobStore>> BlobStore::open(const fs::path& folde
                                                            CheckRoom check_room) {
   std::unique_ptr<BlobStore> store(new BlobStore(folder, durability, std::move(check_room)));
   for (const fs::path& sub : {store->layout_.uploads(), store->layout_.trash()}) {
-    std::error_code error;
-    fs::create_directories(sub, error);
-    if (error) return failed(sub, "make", error.value());
+    LL_RETURN_IF_ERROR(store->make_folder(sub));
   }
   return store;
+}
+
+absl::Status BlobStore::make_folder(const fs::path& folder) const {
+  const std::lock_guard lock(mutex_);
+  if (std::error_code error; made_.contains(folder) && fs::exists(folder, error)) return absl::OkStatus();
+  if (durability_ == Durability::kPowerLoss) {
+    LL_RETURN_IF_ERROR(make_durable_folder(folder));
+  } else {
+    std::error_code error;
+    fs::create_directories(folder, error);
+    if (error) return failed(folder, "make", error.value());
+  }
+  made_.insert(folder);
+  return absl::OkStatus();
 }
 
 std::shared_ptr<std::mutex> BlobStore::turn(const Digest& digest) {
@@ -213,11 +225,10 @@ absl::Status BlobStore::append(const Digest& digest, uint64_t size, uint64_t off
 
 absl::Status BlobStore::commit(const fs::path& temporary, const Digest& digest) const {
   const fs::path path = layout_.blob(digest);
-  std::error_code error;
-  fs::create_directories(path.parent_path(), error);
-  if (error) return failed(path.parent_path(), "make", error.value());
+  LL_RETURN_IF_ERROR(make_folder(path.parent_path()));
   touch(temporary);  // its last byte may have come long ago
   if (durability_ == Durability::kPowerLoss) return commit_file(temporary, path);
+  std::error_code error;
   fs::rename(temporary, path, error);
   return error ? failed(temporary, "rename", error.value()) : absl::OkStatus();
 }

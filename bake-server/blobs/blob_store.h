@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <span>
 #include <vector>
 
@@ -57,12 +58,14 @@ class BlobStore {
   BlobStore(const std::filesystem::path& folder, Durability durability, CheckRoom check_room)
       : layout_(folder), durability_(durability), check_room_(std::move(check_room)) {}
   absl::Status commit(const std::filesystem::path& temporary, const Digest& digest) const;
+  absl::Status make_folder(const std::filesystem::path& folder) const;
   std::shared_ptr<std::mutex> turn(const Digest& digest);
 
   BlobLayout layout_;
   Durability durability_;
   CheckRoom check_room_;
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
+  mutable std::set<std::filesystem::path> made_;       // folders that are there, durably
   std::map<Digest, std::weak_ptr<std::mutex>> turns_;  // one upload of a blob at a time
 };
 

@@ -8,7 +8,8 @@
 #include <cerrno>
 #include <cstring>
 #include <string>
-#include <system_error>
+
+#include "core/base/file.h"
 
 namespace lightloom {
 
@@ -30,9 +31,10 @@ FolderLock::~FolderLock() {
 }
 
 absl::Status FolderLock::take(const fs::path& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) return unusable(folder, error.value());
+  if (const absl::Status made = make_durable_folder(folder); !made.ok()) {
+    return absl::Status(
+        made.code(), absl::StrCat("cannot use the state folder ", folder.string(), ": ", std::string(made.message())));
+  }
   const fs::path file = folder / "lock";
   fd_ = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0644);
   if (fd_ < 0) return unusable(folder, errno);

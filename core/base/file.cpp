@@ -132,6 +132,26 @@ absl::Status check_writable(const fs::path& path) {
   return absl::OkStatus();
 }
 
+absl::Status make_durable_folder(const fs::path& folder) {
+  std::error_code error;
+  fs::path path = fs::absolute(folder, error).lexically_normal();
+  if (error) return system_error("cannot make folder", folder, error.value());
+  if (!path.has_filename()) path = path.parent_path();
+  // A folder is as durable as its name, which is in the one above.
+  std::vector<fs::path> named_in{path.parent_path()};
+  while (!fs::exists(named_in.back(), error) && named_in.back().has_relative_path()) {
+    named_in.push_back(named_in.back().parent_path());
+  }
+  fs::create_directories(path, error);
+  if (error) return system_error("cannot make folder", path, error.value());
+  for (const fs::path& above : named_in) {
+    const absl::Status synced = sync_path(above, O_RDONLY | O_DIRECTORY);
+    // One that may not be read cannot be synced: its owner made what we use.
+    if (!synced.ok() && !absl::IsPermissionDenied(synced)) return synced;
+  }
+  return absl::OkStatus();
+}
+
 fs::path temporary_beside(const fs::path& path) {
   static std::atomic<uint64_t> counter{0};
   fs::path temporary = path;
@@ -152,12 +172,8 @@ absl::Status commit_file(const fs::path& temporary, const fs::path& path) {
 }
 
 absl::Status write_file_atomic(const fs::path& path, std::span<const uint8_t> data) {
-  if (path.has_parent_path()) {
-    std::error_code error;
-    fs::create_directories(path.parent_path(), error);
-    if (error) {
-      return system_error("cannot create folder", path.parent_path(), error.value());
-    }
+  if (std::error_code error; path.has_parent_path() && !fs::is_directory(path.parent_path(), error)) {
+    LL_RETURN_IF_ERROR(make_durable_folder(path.parent_path()));
   }
   LL_RETURN_IF_ERROR(check_replaceable(path));
   const fs::path temporary = temporary_beside(path);

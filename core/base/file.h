@@ -27,6 +27,10 @@ absl::StatusOr<std::vector<uint8_t>> read_file(const std::filesystem::path& path
 absl::Status write_file_atomic(const std::filesystem::path& path, std::span<const uint8_t> data);
 absl::Status write_file_atomic(const std::filesystem::path& path, std::string_view text);
 
+/// Makes a folder, and those above it, so that they outlive a power loss. Also where it is there already: who made it may
+/// not have come so far.
+absl::Status make_durable_folder(const std::filesystem::path& folder);
+
 /// Whether write_file_atomic would replace what is at `path`, if anything.
 absl::Status check_replaceable(const std::filesystem::path& path);
 /// Also tries to make a file in its folder, or the nearest one above that exists. Leaves nothing behind.

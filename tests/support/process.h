@@ -64,7 +64,10 @@ class Process {
     return line([&](const std::string& line) { return line.find(what) != std::string::npos; });
   }
 
-  void signal(int number) const { ::kill(pid_, number); }
+  void signal(int number) const {
+    LL_CHECK(pid_ > 0);  // -1 would be everybody
+    ::kill(pid_, number);
+  }
   /// Until it ends by itself: its exit code, or -signal.
   int wait() {
     while (read_more()) {
