@@ -26,11 +26,16 @@ absl::StatusOr<std::string> join(const std::shared_ptr<grpc::Channel>& channel, 
   v1::JoinRequest request;
   to_proto(self, &request);
 
-  grpc::ClientContext context;
-  context.set_deadline(std::chrono::system_clock::now() + deadline);
-  context.set_wait_for_ready(true);  // a worker may be up before its server
+  constexpr int kTries = 5;  // connections may be cut
+  const auto end = std::chrono::system_clock::now() + deadline;
   v1::JoinResponse response;
-  const grpc::Status status = v1::WorkerService::NewStub(channel)->Join(&context, request, &response);
+  grpc::Status status;
+  for (int i = 0; i == 0 || (i < kTries && status.error_code() == grpc::StatusCode::UNAVAILABLE); ++i) {
+    grpc::ClientContext context;
+    context.set_deadline(end);
+    context.set_wait_for_ready(true);  // a worker may be up before its server
+    status = v1::WorkerService::NewStub(channel)->Join(&context, request, &response);
+  }
   if (status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED) {
     return absl::UnavailableError(
         absl::StrCat("no answer within ", deadline.count(), " ms: is lightloom-server running there?"));

@@ -167,15 +167,17 @@ absl::StatusOr<std::vector<uint8_t>> BlobStore::read(const Digest& digest, uint6
   return absl::NotFoundError("there is no blob " + digest.hex());
 }
 
-void BlobStore::set_damaged_aside(const Digest& digest) {
+absl::Status BlobStore::set_damaged_aside(const Digest& digest) {
   const auto mine = turn(digest);
   const std::lock_guard lock(*mine);
   const fs::path path = layout_.blob(digest);
   // Somebody may have put a right one there since.
-  if (const auto found = digest_of(path); !found.ok() || *found == digest) return;
+  LL_ASSIGN_OR_RETURN(const Digest found, digest_of(path));
+  if (found == digest) return absl::OkStatus();
   std::error_code error;
   fs::create_directories(layout_.damaged(), error);
-  fs::rename(path, layout_.damaged() / digest.hex(), error);
+  if (!error) fs::rename(path, layout_.damaged() / digest.hex(), error);
+  return error ? failed(path, "set aside", error.value()) : absl::OkStatus();
 }
 
 uint64_t BlobStore::uploaded(const Digest& digest) const {

@@ -43,7 +43,7 @@ class BlobStore {
   /// At most `most` bytes from `offset` on; none at the end.
   absl::StatusOr<std::vector<uint8_t>> read(const Digest& digest, uint64_t offset, uint64_t most) const;
   /// Its file holds other bytes, as a disk may have it: from now on the blob is not there, and can be put again.
-  void set_damaged_aside(const Digest& digest);
+  absl::Status set_damaged_aside(const Digest& digest);
 
   /// Bytes of the blob that have arrived; all of them: as has().
   uint64_t uploaded(const Digest& digest) const;

@@ -73,25 +73,28 @@ absl::Status Dispatcher::record(const SyncMessage& message, Worker* worker, Sync
     answer->acknowledged.push_back(attempt);
     forget(attempt, worker);
   };
+  const auto fail = [&](const std::string& attempt, const std::string& reason) -> absl::Status {
+    LL_ASSIGN_OR_RETURN(const bool failed, store_->fail(attempt, reason, now_ms, options_.max_failures));
+    worker->failed_in_row += failed;
+    return absl::OkStatus();
+  };
   for (const auto& f : message.finished) {
     const absl::Status there = blobs_->require(f.outputs);
     const auto completion =
         there.ok() ? store_->complete(f.attempt, f.outputs, f.tasks, now_ms) : absl::StatusOr<Completion>(there);
     if (absl::IsInvalidArgument(completion.status())) {
-      LL_RETURN_IF_ERROR(
-          store_->fail(f.attempt, std::string(completion.status().message()), now_ms, options_.max_failures).status());
+      LL_RETURN_IF_ERROR(fail(f.attempt, std::string(completion.status().message())));
     } else if (!completion.ok()) {
       return completion.status();
-    } else if (const auto held = worker->held.find(f.attempt);
-               *completion == Completion::kAccepted && held != worker->held.end()) {
-      rays_.add(held->second.job, f.rays);
+    } else {
+      const auto held = worker->held.find(f.attempt);
+      if (*completion == Completion::kAccepted && held != worker->held.end()) rays_.add(held->second.job, f.rays);
+      worker->failed_in_row = 0;
     }
     acknowledge(f.attempt);
-    worker->failed_in_row = 0;
   }
   for (const auto& f : message.failed) {
-    ++worker->failed_in_row;
-    LL_RETURN_IF_ERROR(store_->fail(f.attempt, f.reason, now_ms, options_.max_failures).status());
+    LL_RETURN_IF_ERROR(fail(f.attempt, f.reason));
     acknowledge(f.attempt);
   }
   LL_RETURN_IF_ERROR(store_->release(message.worker, message.released, now_ms));

@@ -121,7 +121,7 @@ class Reading final : public grpc::ServerWriteReactor<v1::ReadResponse> {
   absl::Status check() {
     if (!whole_ || hasher_.finish() == digest_) return absl::OkStatus();
     spdlog::error("blob " + digest_.hex() + " is damaged: its disk should be looked at");
-    store_->set_damaged_aside(digest_);
+    LL_RETURN_IF_ERROR(store_->set_damaged_aside(digest_));
     return damaged(digest_);
   }
 

@@ -32,8 +32,10 @@ FolderLock::~FolderLock() {
 
 absl::Status FolderLock::take(const fs::path& folder) {
   if (const absl::Status made = make_durable_folder(folder); !made.ok()) {
+    const bool full = absl::IsResourceExhausted(made);
     return absl::Status(
-        made.code(), absl::StrCat("cannot use the state folder ", folder.string(), ": ", std::string(made.message())));
+        full ? made.code() : absl::StatusCode::kPermissionDenied,
+        absl::StrCat("cannot use the state folder ", folder.string(), ": ", std::string(made.message())));
   }
   const fs::path file = folder / "lock";
   fd_ = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0644);

@@ -128,7 +128,10 @@ class Collection {
   absl::StatusOr<bool> discard(const Digest& digest, int64_t changed_ns) const {
     if (options_.dry_run) return true;
     const fs::path from = layout_.blob(digest), to = layout_.discarded(digest);
-    if (::rename(from.c_str(), to.c_str()) != 0) return failed("move", from, errno);
+    if (::rename(from.c_str(), to.c_str()) != 0) {
+      if (errno == ENOENT) return false;  // it was found damaged, and set aside
+      return failed("move", from, errno);
+    }
     const auto info = look_at(to);
     if (!info) return false;  // it was put back
     if (info->changed_ns != changed_ns) {

@@ -145,9 +145,10 @@ absl::Status make_durable_folder(const fs::path& folder) {
   fs::create_directories(path, error);
   if (error) return system_error("cannot make folder", path, error.value());
   for (const fs::path& above : named_in) {
-    const absl::Status synced = sync_path(above, O_RDONLY | O_DIRECTORY);
-    // One that may not be read cannot be synced: its owner made what we use.
-    if (!synced.ok() && !absl::IsPermissionDenied(synced)) return synced;
+    // One that may not be read, or is of a kind that cannot be synced, has held what we use before.
+    const Fd fd(::open(above.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+    if (fd.get() < 0 || ::fsync(fd.get()) == 0) continue;
+    if (errno != EINVAL && errno != EROFS && errno != ENOTSUP) return system_error("cannot sync", above);
   }
   return absl::OkStatus();
 }

@@ -27,7 +27,7 @@ absl::StatusOr<std::vector<uint8_t>> read_file(const std::filesystem::path& path
 absl::Status write_file_atomic(const std::filesystem::path& path, std::span<const uint8_t> data);
 absl::Status write_file_atomic(const std::filesystem::path& path, std::string_view text);
 
-/// Makes a folder, and those above it, so that they outlive a power loss. Also where it is there already: who made it may
+/// Makes a folder, and those above it, so that they outlive a power loss; also where it is there already, as who made it may
 /// not have come so far.
 absl::Status make_durable_folder(const std::filesystem::path& folder);
 

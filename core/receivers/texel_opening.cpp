@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <optional>
 #include <utility>
 
@@ -34,6 +33,68 @@ std::optional<ShadingPoint> part_point(const Object& object, const LightmapUv& u
   return shading_point(object, p->triangle, p->b1, p->b2, back);
 }
 
+using Points = std::array<std::optional<ShadingPoint>, kParts>;
+
+/// Of the parts that have a point.
+struct OpenParts {
+  uint32_t parts = 0;
+  std::vector<ShadingPoint> points;
+  size_t size = 0;    ///< parts; those that are not in the void count for more than all that are
+  bool whole = true;  ///< there is none that does not count
+};
+
+/// The space that has most of them.
+OpenParts find_open_parts(const RayTracer& tracer, const Points& points, uint64_t seed) {
+  std::array<Space, kParts> what{};
+  what.fill(Space::kSolid);
+  const auto open = [&](size_t k) { return what[k] != Space::kSolid; };
+  for (int i = 0; i < kTexelParts * kTexelParts; ++i) {
+    const size_t k = static_cast<size_t>(i);
+    if (!points[k]) continue;
+    // What a straight line joins is the same space: most parts need no more than one ray.
+    const auto seen_from = [&](int j) {
+      const auto& other = points[static_cast<size_t>(j)];
+      return other && tracer.visible(points[k]->position, other->position);
+    };
+    if (i % kTexelParts > 0 && seen_from(i - 1)) {
+      what[k] = what[k - 1];
+    } else if (i >= kTexelParts && seen_from(i - kTexelParts)) {
+      what[k] = what[k - kTexelParts];
+    } else {
+      what[k] = classify(tracer, *points[k], hash_combine(seed, k));
+    }
+  }
+
+  // Something may keep open parts apart, such as a door that is shut: the space that has most of them counts, but before
+  // the void outside of a level any other.
+  std::array<size_t, kParts> space{};  // of each part: the first one that it is joined with
+  std::array<size_t, kParts> size{};   // of each space, parts; one that is not void counts for more than all that are
+  for (size_t k = 0; k < kParts; ++k) {
+    space[k] = k;
+    if (!open(k)) continue;
+    size[k] = what[k] == Space::kVoid ? 1 : kParts + 1;
+    for (size_t j = k; j-- > 0;) {
+      const size_t a = std::min(space[j], space[k]), b = std::max(space[j], space[k]);
+      if (!open(j) || a == b || !joined(tracer, *points[j], *points[k])) continue;
+      std::replace(space.begin(), space.begin() + static_cast<std::ptrdiff_t>(k) + 1, b, a);
+      size[a] += std::exchange(size[b], 0);
+    }
+  }
+  const size_t largest = static_cast<size_t>(std::max_element(size.begin(), size.end()) - size.begin());
+  OpenParts out;
+  out.size = size[largest];
+  for (size_t k = 0; k < kParts; ++k) {
+    if (!points[k]) continue;
+    if (open(k) && space[k] == largest) {
+      out.points.push_back(*points[k]);
+      out.parts |= 1u << k;
+    } else {
+      out.whole = false;
+    }
+  }
+  return out;
+}
+
 }  // namespace
 
 std::vector<ShadingPoint> texel_points(const Object& object, const LightmapUv& uv, const TexelGrid& grid,
@@ -54,78 +115,29 @@ TexelOpening::TexelOpening(const RayTracer& tracer, const Object& object, const 
                            const Texel& texel, bool back, uint64_t seed)
     : tracer_(tracer), object_(object), uv_(uv), texel_(texel), back_(back) {
   if (!anything_stands_on_it()) return;
-  const auto points = [&](size_t place) {
-    Points out;
+  const auto open_parts = [&](size_t place) {
+    Points points;
     for (int i = 0; i < kTexelParts * kTexelParts; ++i) {
-      out[static_cast<size_t>(i)] = part_point(object, uv, grid, texel, back, place, i);
+      points[static_cast<size_t>(i)] = part_point(object, uv, grid, texel, back, place, i);
     }
-    return out;
+    return find_open_parts(tracer, points, place == 0 ? seed : hash_combine(seed, place));
   };
-  find_open_parts(points(0), seed);
-  if (parts_ != 0 || whole_) return;
-  // Nothing is open at the middles: what can be seen of it may be a strip that is narrower than a part.
-  const TexelOpening closed(*this);
-  uint32_t most = 0;
-  for (size_t place = 1; place < kPlaces.size(); ++place) {
-    TexelOpening other(closed);
-    other.find_open_parts(points(place), hash_combine(seed, place));
-    if (std::popcount(other.parts_) <= std::popcount(most)) continue;
-    most = other.parts_;
-    open_ = other.open_;
-    parts_ = most | static_cast<uint32_t>(place << kPlaceShift);
-  }
-  whole_ = parts_ == 0;
-}
-
-/// Sets parts_ and open_, or whole_ if all of them are open.
-void TexelOpening::find_open_parts(const Points& points, uint64_t seed) {
-  std::array<Space, kParts> what{};
-  what.fill(Space::kSolid);
-  const auto open = [&](size_t k) { return what[k] != Space::kSolid; };
-  for (int i = 0; i < kTexelParts * kTexelParts; ++i) {
-    const size_t k = static_cast<size_t>(i);
-    if (!points[k]) continue;
-    // What a straight line joins is the same space: most parts need no more than one ray.
-    const auto seen_from = [&](int j) {
-      const auto& other = points[static_cast<size_t>(j)];
-      return other && tracer_.visible(points[k]->position, other->position);
-    };
-    if (i % kTexelParts > 0 && seen_from(i - 1)) {
-      what[k] = what[k - 1];
-    } else if (i >= kTexelParts && seen_from(i - kTexelParts)) {
-      what[k] = what[k - kTexelParts];
-    } else {
-      what[k] = classify(tracer_, *points[k], hash_combine(seed, k));
+  OpenParts best = open_parts(0);
+  whole_ = best.whole;
+  if (whole_) return;
+  // Where nothing is open at the middles, what can be seen of it may be a strip that is narrower than a part.
+  size_t best_place = 0;
+  if (best.parts == 0) {
+    for (size_t place = 1; place < kPlaces.size(); ++place) {
+      OpenParts other = open_parts(place);
+      if (other.size <= best.size) continue;
+      best = std::move(other);
+      best_place = place;
     }
   }
-
-  // Something may keep open parts apart, such as a door that is shut: the space that has most of them counts, but before
-  // the void outside of a level any other.
-  std::array<size_t, kParts> space{};  // of each part: the first one that it is joined with
-  std::array<size_t, kParts> size{};   // of each space, parts; one that is not void counts for more than all that are
-  for (size_t k = 0; k < kParts; ++k) {
-    space[k] = k;
-    if (!open(k)) continue;
-    size[k] = what[k] == Space::kVoid ? 1 : kParts + 1;
-    for (size_t j = k; j-- > 0;) {
-      const size_t a = std::min(space[j], space[k]), b = std::max(space[j], space[k]);
-      if (!open(j) || a == b || !joined(tracer_, *points[j], *points[k])) continue;
-      std::replace(space.begin(), space.begin() + static_cast<std::ptrdiff_t>(k) + 1, b, a);
-      size[a] += std::exchange(size[b], 0);
-    }
-  }
-  const size_t largest = static_cast<size_t>(std::max_element(size.begin(), size.end()) - size.begin());
-  whole_ = true;
-  for (size_t k = 0; k < kParts; ++k) {
-    if (!points[k]) continue;
-    if (open(k) && space[k] == largest) {
-      open_.push_back(*points[k]);
-      parts_ |= 1u << k;
-    } else {
-      whole_ = false;
-    }
-  }
-  if (whole_) parts_ = 0;
+  open_ = std::move(best.points);
+  parts_ = best.parts | static_cast<uint32_t>(best_place << kPlaceShift);
+  whole_ = best.parts == 0;
 }
 
 ShadingPoint TexelOpening::middle() const {
@@ -156,7 +168,11 @@ bool TexelOpening::anything_stands_on_it() const {
       s.position + across * (static_cast<float>(texel.x) - point.x) + up * (static_cast<float>(texel.y) - point.y);
   for (int i = 0; i < kTexelParts; ++i) {
     const float at = (static_cast<float>(i) + 0.5f) / kTexelParts;
-    if (tracer_.occluded(corner + up * at, across, 1) || tracer_.occluded(corner + across * at, up, 1)) return true;
+    // Not quite to the end: whether what stands on the border is met would be for the CPU to say.
+    constexpr float kShort = 1 - 0x1p-12f;
+    if (tracer_.occluded(corner + up * at, across, kShort) || tracer_.occluded(corner + across * at, up, kShort)) {
+      return true;
+    }
   }
   return false;
 }

@@ -2,9 +2,7 @@
 // averaged over what can be seen. Nor may it be averaged over both sides of a sheet.
 #pragma once
 
-#include <array>
 #include <cstdint>
-#include <optional>
 #include <vector>
 
 #include "core/receivers/surface_point.h"
@@ -39,9 +37,6 @@ class TexelOpening {
   ShadingPoint middle() const;
 
  private:
-  using Points = std::array<std::optional<ShadingPoint>, size_t{kTexelParts} * kTexelParts>;
-
-  void find_open_parts(const Points& points, uint64_t seed);
   ShadingPoint lifted(const SurfacePoint& p) const { return shading_point(object_, p.triangle, p.b1, p.b2, back_); }
   bool anything_stands_on_it() const;
 

@@ -22,7 +22,7 @@ struct GeometryContext {
 };
 
 /// Embree's distances come from estimates of reciprocals, which differ between CPU makers, and are off by more where a
-/// triangle is thin or hit at a grazing angle. Hits nearer to each other than this, relatively, are told apart by
+/// triangle is thin, hit at a grazing angle, or large and close. Hits nearer to each other than this, relatively, are told apart by
 /// recompute().
 constexpr float kTie = 0x1p-14f;
 

@@ -149,7 +149,8 @@ FarmReport simulate(const FarmOptions& options, const std::filesystem::path& fol
   });
   uint64_t turns = 0;
   for (;;) {
-    if (!agenda.step()) or_exit(absl::InternalError("nothing is left to happen, and the job has not ended"));
+    const bool late = agenda.now() > 100 * (options.plan_seconds + report.ideal_seconds) + 1000;
+    if (late || !agenda.step()) or_exit(absl::InternalError("the job goes on without end"));
     if (job == 0 || !around.coordinator.idle() || turns == around.coordinator.costs().turns) continue;
     turns = around.coordinator.costs().turns;
     if (or_exit(store->job(job)).state != JobState::kRunning) break;

@@ -116,12 +116,6 @@ class PowerLossFarm : public BrokenFarm {
     LL_CHECK(server_->pid() > 0);  // -1 would be everybody
     server_->signal(SIGTERM);
   }
-  static std::vector<std::string> names_of(const Files& files) {
-    std::vector<std::string> out;
-    for (const auto& file : files) out.push_back(file.first);
-    return out;
-  }
-
   /// A server that loses power at its change of files number `at`; 0: never. Until it ends: its exit code, or -signal.
   int serve(long at) {
     {

@@ -1,11 +1,12 @@
 // A way to a server on this machine on which things go wrong.
 #pragma once
 
+#include <fcntl.h>
 #include <poll.h>
 
-#include <chrono>
 #include <list>
 #include <mutex>
+#include <optional>
 #include <span>
 
 #include "tests/support/loopback.h"
@@ -23,17 +24,18 @@ class TcpProxy {
   TcpProxy(const std::string& server, Meddle meddle)
       : port_(static_cast<uint16_t>(std::stoi(server.substr(server.rfind(':') + 1)))),
         meddle_(std::move(meddle)),
-        front_([this](int client) { take(client); }) {}
+        front_(std::in_place, [this](int client) { take(client); }) {}
   ~TcpProxy() {
     stop_ = true;
+    front_.reset();  // no more come in
     for (std::thread& way : ways_) way.join();
   }
 
-  const std::string& address() const { return front_.address(); }
+  const std::string& address() const { return front_->address(); }
 
  private:
   void take(int client) {
-    const int own = ::dup(client);  // whoever listens closes his
+    const int own = ::fcntl(client, F_DUPFD_CLOEXEC, 0);  // whoever listens closes his
     ways_.emplace_back([this, own] { serve(own); });
   }
   void serve(int client) {
@@ -73,7 +75,7 @@ class TcpProxy {
   std::mutex mutex_;
   std::atomic<bool> stop_{false};
   std::list<std::thread> ways_;
-  Answering front_;  // last: its thread uses the others
+  std::optional<Answering> front_;  // last: its thread uses the others
 };
 
 }  // namespace lightloom::test

@@ -369,6 +369,10 @@ TEST(FindReceivers, NoTexelWithAStripInTheRoomStandsForTheVoid) {
     const World w(room_with_box({-0.22f, 0.5f, 1}, {0.22f, 2, 1.44f}), density);
     for (const Receiver& r : w.receivers.all) {
       if (r.object != w.object("box") || r.parts == 0) continue;
+      const TexelGrid& grid = w.receivers.grids[r.object];
+      const auto all =
+          texel_points(w.scene.objects[r.object], w.layout.uv[r.object], grid, grid.texels[r.texel], r.back, 0);
+      if (std::none_of(all.begin(), all.end(), [](const ShadingPoint& p) { return p.position.x > 0; })) continue;
       astride += std::abs(r.point.geometric.z) > 0.5f;
       EXPECT_GT(r.point.position.x, 0) << density;
     }
