@@ -7,14 +7,14 @@
 #include <utility>
 #include <vector>
 
-#include "tests/bench/agenda.h"
+#include "tests/support/agenda.h"
 
 namespace lightloom::bench {
 
 /// Its transfers share the rate evenly, as the streams of one server do.
 class SharedLink {
  public:
-  SharedLink(Agenda* agenda, double bytes_per_second) : agenda_(*agenda), rate_(bytes_per_second) {}
+  SharedLink(test::Agenda<double>* agenda, double bytes_per_second) : agenda_(*agenda), rate_(bytes_per_second) {}
 
   void send(double bytes, std::function<void()> arrived) {
     advance();
@@ -50,7 +50,7 @@ class SharedLink {
     });
   }
 
-  Agenda& agenda_;
+  test::Agenda<double>& agenda_;
   const double rate_;
   double at_ = 0, each_ = 0;  // bytes that one would have that was there from the beginning
   double busy_seconds_ = 0;

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "bake-server/coordinator/dispatcher.h"
-#include "tests/bench/agenda.h"
 #include "tests/bench/cpu_time.h"
 #include "tests/bench/or_exit.h"
+#include "tests/support/agenda.h"
 
 namespace lightloom::bench {
 
@@ -25,8 +25,8 @@ class SimulatedCoordinator {
  public:
   /// `charge_seconds`: what a Sync costs; none: what its turn took of this thread's CPU, and `commit_seconds` for the
   /// disk.
-  SimulatedCoordinator(Agenda* agenda, Store* store, BlobStore* blobs, std::optional<double> charge_seconds,
-                       double commit_seconds)
+  SimulatedCoordinator(test::Agenda<double>* agenda, Store* store, BlobStore* blobs,
+                       std::optional<double> charge_seconds, double commit_seconds)
       : agenda_(*agenda),
         store_(*store),
         charge_seconds_(charge_seconds),
@@ -88,7 +88,7 @@ class SimulatedCoordinator {
     return options;
   }
 
-  Agenda& agenda_;
+  test::Agenda<double>& agenda_;
   Store& store_;
   const std::optional<double> charge_seconds_;
   const double commit_seconds_;

@@ -95,7 +95,7 @@ FarmReport simulate(const FarmOptions& options, const std::filesystem::path& fol
   const auto store = or_exit(open_sqlite_store(folder, Durability::kProcess));
   const auto blobs = or_exit(BlobStore::open(folder / "blobs", Durability::kProcess));
   const Cells cells(options, blobs.get());
-  Agenda agenda;
+  test::Agenda<double> agenda;  // seconds
   Surroundings around{
       .agenda = agenda,
       .from_server{&agenda, options.link_bytes_per_second},

@@ -12,15 +12,15 @@
 
 #include "bake-server/coordinator/dispatcher.h"
 #include "core/base/rng.h"
-#include "tests/bench/agenda.h"
 #include "tests/bench/shared_link.h"
 #include "tests/bench/simulated_coordinator.h"
+#include "tests/support/agenda.h"
 
 namespace lightloom::bench {
 
 /// What all workers of a farm share.
 struct Surroundings {
-  Agenda& agenda;
+  test::Agenda<double>& agenda;
   SharedLink from_server, to_server;
   SimulatedCoordinator coordinator;
   double latency_seconds = 0;  ///< one way

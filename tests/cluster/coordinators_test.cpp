@@ -104,14 +104,7 @@ TEST_F(CoordinatorsTest, ABackupFromTheMiddleOfAJobGoesOnInAnotherDatabase) {
   std::filesystem::rename(copy, state);
   database_ = PostgresServer::shared().database("restored");
   ASSERT_TRUE(restore(state, database_).ok());
-  start_server("127.0.0.1:0");
-  FarmClient client(address());
-  const RemoteJob there = value_or_die(client.job(job.id));
-  EXPECT_EQ(there.state, "running");
-  EXPECT_GE(there.done, 3u);
-  const RunningWorker worker(dial(address()), "another");
-  EXPECT_EQ(watch(job.id).state, "done");
-  expect_fetched_as_baked(job.id);
+  expect_to_go_on(job.id, 3);
 }
 
 }  // namespace

@@ -122,6 +122,19 @@ class FarmTest : public testing::Test {
     EXPECT_TRUE(verify_asset(fetched).ok());
   }
 
+  /// The server starts on what is there; the job has so many tasks done, and another worker finishes it.
+  void expect_to_go_on(uint64_t job, uint64_t done) {
+    start_server("127.0.0.1:0");
+    FarmClient client(address());
+    const RemoteJob there = value_or_die(client.job(job));
+    EXPECT_EQ(there.state, "running");
+    EXPECT_GE(there.done, done);
+    const RunningWorker worker(dial(address()), "another");
+    const RemoteJob end = watch(job);
+    ASSERT_EQ(end.state, "done") << end.error;
+    expect_fetched_as_baked(job);
+  }
+
   TemporaryFolder folder_;
   std::filesystem::path scene_path_;
   std::vector<uint8_t> scene_;

@@ -112,15 +112,7 @@ TEST_F(UpkeepFarm, ABackupFromTheMiddleOfAJobGoesOnElsewhere) {
   stop_server();
   fs::remove_all(state());
   fs::rename(folder_.path() / "copy", state());
-  start_server("127.0.0.1:0");
-  FarmClient client(address());
-  const RemoteJob there = value_or_die(client.job(job.id));
-  EXPECT_EQ(there.state, "running");
-  EXPECT_GE(there.done, 3u);
-  const RunningWorker worker(dial(address()), "another");
-  const RemoteJob end = watch(job.id);
-  ASSERT_EQ(end.state, "done") << end.error;
-  expect_fetched_as_baked(job.id);
+  expect_to_go_on(job.id, 3);
 }
 
 TEST_F(UpkeepFarm, AJobThatTheReleaseBeforeBeganIsFinished) {
@@ -145,15 +137,7 @@ TEST_F(UpkeepFarm, AJobThatTheReleaseBeforeBeganIsFinished) {
   }
   sqlite3_close(database);
 
-  start_server("127.0.0.1:0");
-  FarmClient client(address());
-  const RemoteJob there = value_or_die(client.job(job.id));
-  EXPECT_EQ(there.state, "running");
-  EXPECT_GE(there.done, 3u);
-  const RunningWorker worker(dial(address()), "another");
-  const RemoteJob end = watch(job.id);
-  ASSERT_EQ(end.state, "done") << end.error;
-  expect_fetched_as_baked(job.id);
+  expect_to_go_on(job.id, 3);
 }
 
 // Without a grace period a result may go between its upload and its report: nothing is promised. What races with one is an

@@ -14,6 +14,7 @@
 
 #include "bake-server/coordinator/dispatcher.h"
 #include "bake-server/store/sqlite_store.h"
+#include "tests/support/agenda.h"
 #include "tests/unit/bake-server/store_fixture.h"
 
 namespace lightloom::test {
@@ -34,25 +35,6 @@ std::vector<NewTask> spawned_by(const Assignment& a) {
   out.push_back({"assemble", 2, "", kCells});
   return out;
 }
-
-/// Things that happen at their time; at the same time, in the order in which they were planned.
-class Agenda {
- public:
-  int64_t now() const { return now_; }
-  void at(int64_t time, std::function<void()> what) { queue_.emplace(std::pair(time, next_++), std::move(what)); }
-  bool step() {
-    if (queue_.empty()) return false;
-    auto first = queue_.extract(queue_.begin());
-    now_ = std::max(now_, first.key().first);
-    first.mapped()();
-    return true;
-  }
-
- private:
-  int64_t now_ = 0;
-  uint64_t next_ = 0;
-  std::map<std::pair<int64_t, uint64_t>, std::function<void()>> queue_;
-};
 
 class Chance {
  public:
@@ -303,7 +285,7 @@ class Schedule {
     for (const JobView& view : value(store_->view(1))) EXPECT_FALSE(jobs_.contains(view.id));
   }
 
-  Agenda agenda_;
+  Agenda<int64_t> agenda_;  // milliseconds
   Chance chance_;
   uint64_t seed_;
   Store* store_;
