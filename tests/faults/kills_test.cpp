@@ -1,84 +1,17 @@
-// Workers and coordinators that are killed at work, and workers that are held up for longer than their leases.
+// Workers and coordinators that are killed at work, workers that are held up for longer than their leases, and one of two
+// coordinators that dies.
 #include <signal.h>
 
-#include <random>
-
-#include "tests/faults/broken_farm.h"
+#include "tests/faults/kills.h"
 #include "tests/support/postgres_server.h"
 
 namespace lightloom::test {
 namespace {
 
-constexpr int kKills = 20;
-constexpr size_t kJobs = 4;
-
-class Kills : public BrokenFarm {
- protected:
-  void SetUp() override {
-    BrokenFarm::SetUp();
-    start_server();
-    for (const char* name : {"a", "b", "c"}) start_worker(name);
-  }
-  /// Jobs, one after the other, until enough were hit and enough are done; `hit` may break things while one runs.
-  void keep_busy(const std::function<bool()>& enough, const std::function<void()>& hit) {
-    for (int variant = 0; !enough() || told_.size() < kJobs; ++variant) {
-      const RemoteJob job = submit(variant);
-      uint64_t done = 0;
-      const RemoteJob ended = watch(job.id, [&](const RemoteJob& now) {
-        if (enough() || now.running == 0 || now.done < done + 2) return;
-        done = now.done;
-        hit();
-      });
-      EXPECT_EQ(ended.state, "done") << ended.error;
-      expect_whole(job.id, variant);
-      ASSERT_LT(variant, 20) << "too few of the victims were at work";
-    }
-  }
-  bool kill_worker() {
-    const std::set<std::string> victims = busy();
-    if (victims.empty()) return false;
-    const std::string victim = *std::next(victims.begin(), static_cast<long>(random_() % victims.size()));
-    workers_.at(victim)->stop(SIGKILL);
-    ++faults_;
-    start_worker(victim);
-    return true;
-  }
-  void kill_server() {
-    server_->stop(SIGKILL);
-    ++faults_;
-    start_server();
-    note_all();
-  }
-
-  std::mt19937 random_{1};
-};
-
-TEST_F(Kills, Workers) {
-  keep_busy([&] { return faults_ >= kKills; }, [&] { kill_worker(); });
-  EXPECT_GE(faults_, kKills);
-}
-
-TEST_F(Kills, Coordinators) {
-  keep_busy([&] { return faults_ >= kKills; }, [&] { kill_server(); });
-  EXPECT_GE(faults_, kKills);
-}
-
-TEST_F(Kills, BothAtOnce) {
-  int rounds = 0;
-  keep_busy([&] { return rounds >= 8; },
-            [&] {
-              const std::set<std::string> victims = busy();
-              if (victims.empty()) return;
-              ++rounds;
-              faults_ += 2;
-              workers_.at(*victims.begin())->signal(SIGKILL);
-              server_->stop(SIGKILL);
-              start_server();
-              start_worker(*victims.begin());
-              note_all();
-            });
-  EXPECT_EQ(rounds, 8);
-}
+// More of each in many_kills_test.cpp.
+TEST_F(Kills, Workers) { kill_workers(6, 2); }
+TEST_F(Kills, Coordinators) { kill_servers(4, 2); }
+TEST_F(Kills, BothAtOnce) { kill_both(3, 2); }
 
 TEST_F(Kills, StoppedPastTheLeaseAndResumed) {
   std::string held;

@@ -58,7 +58,7 @@ TEST_F(Network, ConnectionsAreCutAndSlow) {
 /// One byte of long pieces, which are blobs.
 TEST_F(Network, BlobsAreSpoiltOnTheWay) {
   bake_through([&](std::span<char> piece, bool) {
-    if (piece.size() < (size_t{24} << 10) || random_() % 8 != 0) return TcpProxy::Go::kOn;
+    if (piece.size() < (size_t{24} << 10) || random_() % 12 != 0) return TcpProxy::Go::kOn;
     piece[piece.size() / 4 + random_() % (piece.size() / 2)] ^= 0x10;  // its ends may be of other messages
     ++faults_;
     return TcpProxy::Go::kOn;
